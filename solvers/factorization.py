@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict
 from numbers import Integral
@@ -15,6 +16,7 @@ from hierarchy.errors import HierarchyError, check_name, expect
 from hierarchy.gate import Sizes, check_finite, check_rows, level_names, readable, shaped
 from hierarchy.problem import Array, Hierarchy
 from solvers.kernels.staircase import solve_by_staircase
+from solvers.kernels.tolerances import CANCELLED
 from solvers.resolver import Resolution
 from solvers.resolvers.tpm import Tpm, task_priority_matrix
 from solvers.status import INACCURATE, SOLVED, Status
@@ -130,10 +132,11 @@ class Factorization:
     @property
     def ranks(self) -> tuple[int, ...]:
         """Rank that each level adds to the levels above it."""
-        basis, ranks = np.empty((0, self._n)), []
+        basis, ranks = np.empty((0, self._n)), list[int]()
+        least = max(self._settings.rank_tolerance, CANCELLED)
         for level in self._levels:
-            above, zero = len(basis), self._settings.rank_tolerance * norm(level.A, axis=1)
-            left = level.A.copy()
+            left = level.A / _unit(level.A)
+            above, zero = len(basis), least * norm(left, axis=1)
             for _ in range(2):
                 left -= (left @ basis.T) @ basis
             while len(basis) < min(above + len(left), self._n) and (
@@ -242,8 +245,8 @@ class Factorization:
         """Return C (m_k, r) with A = C Q^T, after adding the new directions of A to the basis."""
         C = np.zeros((len(A), len(self._Q) + len(A)))
         for row, c in zip(A, C, strict=True):
-            scale = np.exp2(np.frexp(np.abs(row).max())[1])  # so that no square vanishes
-            w, r = row / scale, len(self._Q)
+            unit = _unit(row)
+            w, r = row / unit, len(self._Q)
             size = norm(w)
             for _ in range(_PASSES):
                 along = self._Q @ w
@@ -252,7 +255,7 @@ class Factorization:
             left = norm(w)
             if left > _OUTSIDE * size and r < self._n:
                 c[r], self._Q = left, np.vstack([self._Q, w / left])
-            c *= scale
+            c *= unit
         return C[:, :len(self._Q)]
 
     @property
@@ -321,3 +324,8 @@ class Factorization:
             if name not in targets:
                 raise HierarchyError(f"{name}: no target given")
         return [targets[name] for name in self.names]
+
+
+def _unit(A: Array) -> float:
+    """Return a power of two near the largest entry, in whose unit squares are numbers."""
+    return math.ldexp(1.0, min(math.frexp(np.abs(A).max(initial=0.0))[1], 1023))

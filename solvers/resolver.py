@@ -98,6 +98,7 @@ class Resolver(ABC):
     threshold : singular value below which damping starts, in the unit of the rows.
     rank_tolerance : a row counts as dependent on the rows above it when the norm of what is left
         of it is at most rank_tolerance times its norm as given. The scale of a row does not matter.
+        Less than 1e-14, which is rounding, is as much.
 
     Raises HierarchyError: a setting is not a number or is out of range.
     """

@@ -15,6 +15,7 @@ import numpy as np
 
 from hierarchy.errors import HierarchyError
 from solvers.batch import Batch, BatchResolution
+from solvers.kernels.tolerances import CANCELLED
 from solvers.resolver import Resolver, make, refuse_inequality
 from solvers.resolvers.tpm import Tpm
 from solvers.status import NUMERICAL_FAILURE, SOLVED
@@ -57,13 +58,13 @@ def staircase(A: jax.Array, b: jax.Array, reference: jax.Array, sizes: tuple[int
     A (m, n), b (m,), reference (n,). The sizes of the levels and damping are fixed at compile time;
     the settings are those of `Resolver`.
     """
-    square = jnp.sum(A * A, axis=1)
+    square, least = jnp.sum(A * A, axis=1), jnp.maximum(rank_tolerance, CANCELLED)
     x, Q = jnp.zeros_like(reference), jnp.zeros_like(A[:0])
     first = 0
     for size in sizes:
         if size:
             rows = slice(first, first + size)
-            L, new = _factor(_outside(A[rows], Q), rank_tolerance**2 * square[rows])
+            L, new = _factor(_outside(A[rows], Q), least**2 * square[rows])
             lambda_ = _damping(L, new, damping, threshold) if damping > 0.0 else None
             y = _least_squares(L, b[rows] - A[rows] @ x, lambda_)  # p_i - J_i x_{i-1}, in (13)
             x, Q = x + y @ new, jnp.concatenate([Q, new])

@@ -163,9 +163,8 @@ def solve(batch: Batch, resolver: Resolver | None = None, threads: int | None = 
     if kernel is batch_within_bounds:  # only an unknown at a bound is worth a memory
         saturated = (record[:, :n] != 0.0).any(axis=1)
         record[~saturated], steps = 0.0, np.maximum(steps, 1.0)
-        if not saturated.any():
-            return BatchResolution(x, codes, steps.astype(np.int64), None)
-    return BatchResolution(x, codes, steps.astype(np.int64), record)
+    kept = record if kernel is not batch_within_bounds or record.any() else None
+    return BatchResolution(x, codes, steps.astype(np.int64), kept)
 
 
 def _way(resolver: Tpm | Hcod | Merged, m: int, n: int, levels: int

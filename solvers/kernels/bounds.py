@@ -4,29 +4,18 @@ Where no bound is active the staircase solves them, else the exact resolver, in 
 cost nothing. This file also finds the saturation of each unknown and the scaling of each level.
 """
 
-from typing import NamedTuple
-
 import numpy as np
 
 from hierarchy.jit import compiled, inlined, internal
 from solvers.kernels.active_set.exact import DAMPING, solve, work_size
 from solvers.kernels.box import first_level, narrow, refused
 from solvers.kernels.linalg.rows import all_equal, finish, only_entry
-from solvers.kernels.linalg.space import View, assign, fill
+from solvers.kernels.linalg.space import assign, fill
 from solvers.kernels.staircase import solve_by_staircase
 from solvers.kernels.tolerances import LEVEL_MET
 from solvers.status import INACCURATE, NUMERICAL_FAILURE, SOLVED, TOO_SMALL, UNPROVED
 
 NONE, CONFLICT = 0.0, 2.0  # besides -1 and 1: an unknown at no bound, or at both
-
-
-class Box(NamedTuple):
-    """Bounds of each unknown (n,); the rows of the first level with rows, and its index."""
-
-    low: View
-    high: View
-    end: View
-    top: View
 
 
 @compiled
@@ -48,7 +37,7 @@ def solve_within_bounds(A, lower, upper, sizes, x, record, settings, work):
         known |= record[i] != 0.0
     if known:
         code = solve(A, lower, upper, sizes, x, inner, settings, work)
-        if code == NUMERICAL_FAILURE or _is_at_bound(A, lower, upper, sizes, x, record, work):
+        if code != NUMERICAL_FAILURE and _is_at_bound(A, lower, upper, sizes, x, record, work):
             return code
         fill(record, 0.0)
         assign(x, reference)
@@ -79,11 +68,11 @@ def _solve_without_bounds(A, lower, upper, sizes, x, inner, settings, work):
     code = refused(A, lower, upper, end)
     if code != SOLVED:
         return finish(x, code) if code == NUMERICAL_FAILURE else code
-    box = _intersect(A, lower, upper, top, end, work)
+    low, high = _intersect(A[:end], lower, upper, work)
     within = SOLVED == solve_by_staircase(A[end:], lower[end:], upper[end:], sizes[top + 1:], x,
                                           settings, work[2 * x.size:])
     for c in range(x.size):
-        within &= box.low[c] < box.high[c] and box.low[c] <= x[c] <= box.high[c]
+        within &= low[c] < high[c] and low[c] <= x[c] <= high[c]
     inner[inner.size - 3] = 1.0 if within else 0.0
     return SOLVED if within else UNPROVED
 
@@ -102,43 +91,42 @@ def _is_at_bound(A, lower, upper, sizes, x, record, work):
     inner = record[n + sizes.size:]
     if refused(A, lower, upper, end) != SOLVED:
         return False
-    box = _intersect(A, lower, upper, top, end, work)
+    low, high = _intersect(A[:end], lower, upper, work)
     for c in range(n):
-        record[c] = CONFLICT if box.low[c] >= box.high[c] else NONE
-        if box.low[c] <= box.high[c]:
-            x[c] = min(max(x[c], box.low[c]), box.high[c])
-    for i in range(box.end):
+        record[c] = CONFLICT if low[c] >= high[c] else NONE
+        if low[c] <= high[c]:
+            x[c] = min(max(x[c], low[c]), high[c])
+    for i in range(end):
         c = only_entry(A[i])
         if record[c] == NONE and abs(inner[i]) == 1.0:
             record[c] = inner[i] if A[i, c] > 0.0 else -inner[i]
-            x[c] = box.high[c] if record[c] > 0.0 else box.low[c]
-    _scale(A, upper, sizes, box, x, record)
+            x[c] = high[c] if record[c] > 0.0 else low[c]
+    _scale(A, upper, sizes, x, record)
     for c in range(n):
         found |= record[c] != NONE
+        if low[c] > high[c]:
+            record[n + top] = 0.0
     return found
 
 
 @inlined
-def _intersect(A, lower, upper, top, end, sides):
-    """Return the Box of the first level; low exceeds high where its rows contradict each other."""
+def _intersect(A, lower, upper, sides):
+    """Return the bounds of each unknown; low exceeds high where rows of A contradict each other."""
     n = A.shape[1]
-    box = Box(sides[:n], sides[n:2 * n], end, top)
-    fill(box.low, -np.inf)
-    fill(box.high, np.inf)
-    for i in range(end):
-        narrow(box.low, box.high, A[i], lower[i], upper[i])
-    return box
+    low, high = sides[:n], sides[n:2 * n]
+    fill(low, -np.inf)
+    fill(high, np.inf)
+    for i in range(A.shape[0]):
+        narrow(low, high, A[i], lower[i], upper[i])
+    return low, high
 
 
 @inlined
-def _scale(A, b, sizes, box, x, record):
+def _scale(A, b, sizes, x, record):
     """Write the scaling of each level: 1 - |A_k x - b_k| / |b_k|, not below zero."""
-    begin, n = box.end, x.size
+    n, (top, begin) = x.size, first_level(sizes)
     fill(record[n:n + sizes.size], 1.0)
-    for c in range(n):
-        if box.low[c] > box.high[c]:
-            record[n + box.top] = 0.0
-    for k in range(box.top + 1, sizes.size):
+    for k in range(top + 1, sizes.size):
         missed = asked = 0.0
         met = True
         for i in range(begin, begin + sizes[k]):

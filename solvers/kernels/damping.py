@@ -29,7 +29,7 @@ from solvers.kernels.linalg.rows import (
 from solvers.kernels.linalg.space import Block, View, assign, integers, matrix, shared, vector
 from solvers.kernels.staircase import carve_staircase, solve_by_staircase
 from solvers.kernels.tolerances import LEVEL_MET, SATURATES
-from solvers.status import NUMERICAL_FAILURE
+from solvers.status import NUMERICAL_FAILURE, UNPROVED
 
 
 class Damped(NamedTuple):
@@ -61,9 +61,9 @@ def damped_size(n, m, levels):
 
 
 @inlined
-def carve_damped(work, at, m, n, levels):
+def carve_damped(work, m, n, levels):
     """Return a Damped without data, and where it ends."""
-    A, at = matrix(work, at, m + n, n)
+    A, at = matrix(work, 0, m + n, n)
     lower, at = vector(work, at, m + n)
     upper, at = vector(work, at, m + n)
     sizes, at = integers(work, at, levels)
@@ -79,9 +79,9 @@ def carve_damped(work, at, m, n, levels):
 
 @internal
 def open_damped(d, A, lower, upper, sizes, x, settings, work):
-    """Write the rows, and the x and lambda of the equalities; return whether x meets all rows.
+    """Write the rows, and the x and lambda of the equalities; return the code of that x.
 
-    The second number is the code of the staircase. x: the reference.
+    SOLVED: it meets all rows, UNPROVED: not all, or NUMERICAL_FAILURE. x: the reference.
     """
     first, count, fixed = 0, 0, False
     for k in range(sizes.size):
@@ -98,11 +98,11 @@ def open_damped(d, A, lower, upper, sizes, x, settings, work):
     E, b = d.E[:count], d.b[:count]
     code = solve_by_staircase(E, b, b, d.ends, d.free, settings, work)
     if code == NUMERICAL_FAILURE or (not fixed and inequalities_hold(A, lower, upper, d.free)):
-        return True, code
+        return code
     _factor_equalities(d, A, sizes, settings, work, True)
     _take_out_exceeded(d, E, A, lower, upper, x)
     _factor_equalities(d, A, sizes, settings, work, False)
-    return False, code
+    return UNPROVED
 
 
 @inlined
@@ -115,9 +115,12 @@ def _copy_row(d, A, lower, upper, i):
 @inlined
 def _are_bounds(d, A, last, k):
     """Whether level k, which ends at row `last`, has bounds alone: they are not damped."""
-    bounds = d.ends[k] < d.sizes[k]
+    bounds = False
     for i in range(last - d.sizes[k], last):
-        bounds = bounds and (only_entry(A[i]) >= 0 or not A[i].any())
+        single = only_entry(A[i]) >= 0
+        if not single and A[i].any():
+            return False
+        bounds = bounds or (single and d.lower[i] < d.upper[i])
     return bounds
 
 

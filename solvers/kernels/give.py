@@ -9,7 +9,12 @@ from typing import NamedTuple
 import numpy as np
 
 from hierarchy.jit import as_matrix, compiled, inlined, inner_product
-from solvers.kernels.active_set.exact import answer, exact_size, open_working_set
+from solvers.kernels.active_set.exact import (
+    answer,
+    exact_size,
+    keep_staircase,
+    open_working_set,
+)
 from solvers.kernels.active_set.working_set import (
     FACTORED,
     FIRST,
@@ -79,13 +84,14 @@ def solve_giving(A, lower, upper, sizes, x, record, settings, work):
     s, code, at = open_working_set(A, lower, upper, sizes, x[:n], record[whole:], settings, work)
     for i in range(m):
         code = code if x[n + i] >= 0.0 else NUMERICAL_FAILURE
-    if code != SOLVED:
-        return finish(x[:n], code)
-    g = Giving(A, lower, upper, x[n:n + m], as_matrix(x[n + m:], (x.size - n - m) // n, n))
-    code, last = _find_witnesses(s, g, record[:whole], settings, work[at:])
+    last = record.size - 3
+    if code == SOLVED:
+        g = Giving(A, lower, upper, x[n:n + m], as_matrix(x[n + m:], (x.size - n - m) // n, n))
+        code, last = _find_witnesses(s, g, record[:whole], settings, work[at:])
     if code not in (SOLVED, INACCURATE):
+        keep_staircase(lower, upper, record[whole:])
         assign(record[record.size - 3:], record[last:])
-        return code
+        return finish(x[:n], code) if code == NUMERICAL_FAILURE else code
     _begin(s, record[whole:])
     found = answer(s, record[whole:], settings, work[at:])
     return code if found == SOLVED else found
@@ -115,10 +121,7 @@ def _find_witnesses(s, g, record, settings, work):
 @inlined
 def _gives(s, g, k):
     """Whether one of the rows of a level gives."""
-    gives = False
-    for i in range(s.index[FIRST, k], s.index[FIRST, k + 1]):
-        gives |= g.give[i] > 0.0
-    return gives
+    return g.give[s.index[FIRST, k]:s.index[FIRST, k + 1]].any()
 
 
 @inlined

@@ -61,9 +61,9 @@ class Projected(NamedTuple):
 
 
 @inlined
-def _carve(work, at, m, n):
+def _carve(work, m, n):
     """Return Projected for m rows of n unknowns, and where it ends."""
-    W, at = matrix(work, at, m, n)
+    W, at = matrix(work, 0, m, n)
     C, at = matrix(work, at, m, n)
     V, at = matrix(work, at, n, n)
     P, at = matrix(work, at, n, n)
@@ -81,7 +81,7 @@ def recursion(A, lower, upper, sizes, x, settings, work):
     rows that its heavy ones round off.
     """
     m, n = A.shape
-    rows, at = _carve(work, 0, m, n)
+    rows, at = _carve(work, m, n)
     y, at = vector(work, at, n)
     q, at = vector(work, at, n)
     of_block, at = vector(work, at, 2 * (m + n) * (n + 1))

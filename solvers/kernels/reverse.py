@@ -11,7 +11,7 @@ staircase finds it at any rank, and no pseudoinverse is formed.
 
 import numpy as np
 
-from hierarchy.jit import compiled, inlined, inner_product
+from hierarchy.jit import add_multiple, compiled, inner_product
 from solvers.kernels.linalg.rows import finish, finish_unless_missed, length_of
 from solvers.kernels.linalg.space import assign, fill, integers, vector
 from solvers.kernels.staircase import carve_staircase, climb
@@ -51,27 +51,18 @@ def reverse(A, lower, upper, sizes, x, settings, work):
         for i in range(first, last):
             if length_of(A[i]) >= NEGLIGIBLE * most:
                 asked[i] = lower[i] - inner_product(A[i], x)  # b_k - J_k x_{k+1}
-        two = parts[k:_end_of_parts(sizes, parts, k, m - last, in_order)]
+        parts[k] = sizes[k]
+        if not in_order and k + 1 < sizes.size:
+            parts[k + 1] = m - last
+        two = parts[k:sizes.size if in_order else k + 2]
         code, pivot = climb(A[first:], asked[first:], asked[first:], two, d, settings, work[at:])
         if code != SOLVED:
             return finish(x, code)
         least = min(least, pivot)
-        for c in range(n):
-            x[c] += d[c]
+        add_multiple(x, 1.0, d)
         fill(asked[first:last], 0.0)
     if sizes.size == 0:
         assign(x, reference)
     code = finish_unless_missed(least == 0.0, A, lower, sizes, x, settings[0])
     unclear = in_order and least < UNCLEAR_PIVOT and settings[0] == 0.0
     return INACCURATE if code == SOLVED and unclear else code
-
-
-@inlined
-def _end_of_parts(sizes, parts, k, below, in_order):
-    """Write the sizes of level k and of those below, each or as one; return where they end."""
-    levels = sizes.size
-    parts[k] = sizes[k]
-    if in_order or k + 1 == levels:
-        return levels
-    parts[k + 1] = below
-    return k + 2

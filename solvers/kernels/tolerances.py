@@ -7,7 +7,7 @@ that there is a floor where x and all sides are zero.
 
 # Rounding. Sums of some hundred terms are off by 1e-15 to 1e-13 of the largest.
 EPSILON = 2e-15            # miss of a row, relative to its terms
-CANCELLED = 1e-14          # sum relative to the norms of its terms
+CANCELLED = 1e-14          # sum relative to the norms of its terms; the least rank_tolerance
 NEGLIGIBLE = 1e-13         # norm, entry or multiplier beside the largest: rounding in the other
 FAINT = 1e-12              # of a row's norm: so far its entries are unsure, at most by themselves
 FAR_LIGHTER = 1e-12        # norm of a row over the largest: the staircase hands such rows on
@@ -45,7 +45,7 @@ DEARER = 0.25        # violation of a level after the second pass over that afte
 UNCLEAR_PIVOT = 1e-5  # of a row in the staircase, or less: the exact engine decides
 LIGHT_ROW = 2e-4     # norm of a row over the largest in a level that is missed: the same
 UNCLEAR_CUT = 0.3    # remainder of a dependent row over the smallest pivot: the same
-ORTHOGONAL = 1e-30   # squared cosine of two rows: Jacobi rotations stop
+ORTHOGONAL = 1e-15   # cosine of two rows: Jacobi rotations stop
 
 # Limits. The pass ends after its number times rows + 1, the whole solve after its number times
 # rows.

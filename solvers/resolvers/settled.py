@@ -154,9 +154,10 @@ class _Above:
         self.behind = False  # whether x misses a level
         self.box = np.full(n, -np.inf), np.full(n, np.inf)
         self.paced = inner.can_resolve("bounds")
-        # One that resolves bounds in a first level only needs all of them there.
-        self.joined = (self.paced and not inner.can_resolve("inequalities") and bool(h.sizes[:1])
-                       and bool((h.lower < h.upper)[:h.sizes[0]].any()))
+        # One that resolves bounds in a first level with rows only needs all of them there.
+        self.top = int((h.sizes > 0).argmax())
+        self.joined = (self.paced and not inner.can_resolve("inequalities")
+                       and bool((h.lower < h.upper)[:h.sizes[self.top]].any()))
 
     def add(self, A: Array, lower: Array, upper: Array, rows: Array) -> None:
         """Add a level, `rows` being those of h."""
@@ -362,8 +363,9 @@ class _Above:
         if self.calmed and self.paced:
             pace = np.eye(len(self.x)), *self.box
             if self.joined:
-                A, lower, upper = map(np.concatenate, zip(pace, levels[0], strict=True))
-                levels = [(A, lower, upper), *levels[1:]]
+                top = self.top
+                A, lower, upper = map(np.concatenate, zip(pace, levels[top], strict=True))
+                levels = [*levels[:top], (A, lower, upper), *levels[top + 1:]]
             else:
                 levels, names = [pace, *levels], (_another("pace", names), *names)
         sizes = np.array([len(lower) for _, lower, _ in levels], dtype=np.int64)

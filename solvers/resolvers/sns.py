@@ -9,7 +9,7 @@ from hierarchy.errors import HierarchyError
 from hierarchy.problem import Array, Hierarchy
 from solvers.kernels.sns import sns
 from solvers.resolution import SaturatedResolution
-from solvers.resolver import Handles, Resolution, Resolver, one_of, register
+from solvers.resolver import Handles, Resolution, Resolver, one_of, place_of, register
 from solvers.status import CONTRADICTION, TOO_SMALL, Status
 from solvers.workspace import WORKSPACE
 
@@ -49,7 +49,7 @@ class Sns(Resolver):
             row = int(record[-1])
             unknown = int(np.flatnonzero(h.A[row])[0])
             raise HierarchyError(
-                f"{h.names[0]}, row {row}: {h.lower[row]:g} <= {h.A[row, unknown]:g} x[{unknown}] "
+                f"{place_of(h, row)}: {h.lower[row]:g} <= {h.A[row, unknown]:g} x[{unknown}] "
                 f"<= {h.upper[row]:g} leaves nothing of the range that the rows above allow for "
                 f"x[{unknown}]")
         if code < 0 or code == TOO_SMALL:

@@ -131,6 +131,34 @@ def test_rows_whose_squares_underflow_are_a_failure_where_they_are_not_solved(re
     assert (res.status, res.x.any()) == (Status.NUMERICAL_FAILURE, False)
 
 
+@pytest.mark.parametrize("name", ["hcod", "recursive", "sns", "tpm"])
+@pytest.mark.parametrize("rank_tolerance", [1e-13, 1e-15, 1e-170, 0.0])
+def test_what_may_be_rounding_is_no_direction_without_a_rank_tolerance(name, rank_tolerance):
+    """Parallel rows were a failure, or SOLVED, |x| = 1e16; with zero no pivot was judged."""
+    def solve(angle):
+        return make(name, rank_tolerance=rank_tolerance).solve(Hierarchy.from_levels([
+            ([[1.0, 1.0]], [1.0]), ([[1.0 / 3, 1.0 / 3 + angle]], [2.0])]))
+
+    assert solve(0.0).status is Status.SOLVED
+    np.testing.assert_allclose(solve(1e-15).x, [0.5, 0.5])
+    judged = name in ("hcod", "tpm")
+    assert solve(1e-12).status is (Status.INACCURATE if judged else Status.SOLVED)
+
+
+@pytest.mark.parametrize("damping", [0.0, 0.1])
+@pytest.mark.parametrize("name", ["hcod", "merged", "tpm"])
+def test_a_failure_with_a_memory_says_nothing_of_an_earlier_solve(name, damping):
+    """`active`, `iterations` and `saturated` were those of the solve that left the memory."""
+    resolver = make(name, damping=damping)
+    h = Hierarchy.from_levels([(np.eye(2), [-1.0, -1.0], [1.0, 1.0]), ([[1.0, 0.5]], [3.0])])
+    memory = resolver.solve(h).memory
+    h.A[2, 0] = np.nan
+    alone, res = resolver.solve(h), resolver.solve(h, memory)
+    assert (res.status, *res.x) == (Status.NUMERICAL_FAILURE, 0.0, 0.0)
+    assert (type(res), res.iterations) == (type(alone), 1)
+    assert res.active is None or 1 not in np.abs(res.active)
+
+
 @pytest.mark.parametrize(("name", "kind", "seeds"), [
     ("hqp", "nested", (9420066,)),  # once a step of dust, far from everything
     ("hqp", "near_ties", (4, 11, 13)),  # more rows were taken to act than can be met at once

@@ -11,7 +11,7 @@ from hierarchy import Hierarchy, HierarchyError
 from solvers import Status, explain, make
 from solvers.explain import holders, is_missed
 from solvers.kernels.active_set.exact import solve_damped, solve_equalities, solve_hierarchy
-from solvers.problems import generate, structured
+from solvers.problems import Recipe, generate, structured
 from solvers.proof import prove
 from solvers.resolvers import hcod
 from solvers.status import EQUAL
@@ -65,6 +65,27 @@ def test_an_iteration_limit_keeps_the_levels_above_and_says_where_it_was(limit):
         assert h.names[k] in explain(h, res)
     apart = Hierarchy.from_levels([([[1.0], [-1.0]], [1.0, 1.0], [2.0, 2.0])])
     assert make("hcod", max_iterations=1).solve(apart).unfinished == 0
+
+
+def test_with_damping_an_iteration_limit_is_reported_as_without():
+    """Equalities below the limit were inactive, and `unfinished` was 0."""
+    for h in map(structured, (2, 5, 7)):
+        for limit in range(1, make("hcod", damping=0.05).solve(h).iterations):
+            res = make("hcod", damping=0.05, max_iterations=limit).solve(h)
+            assert (res.status, res.iterations) == (Status.ITERATION_LIMIT, limit)
+            assert (res.active == EQUAL)[h.lower == h.upper].all()
+            assert 0 < res.unfinished < len(h.sizes)
+
+
+@pytest.mark.parametrize("damping", [0.0, 0.05])
+def test_a_solve_with_the_budget_that_it_needs_is_solved(damping):
+    """A last level with damping was ITERATION_LIMIT where it took the last iteration."""
+    for seed in range(40):
+        h = structured(seed)
+        res = make("hcod", damping=damping).solve(h)
+        if res.status is Status.SOLVED:
+            again = make("hcod", damping=damping, max_iterations=res.iterations).solve(h)
+            assert (again.status, *again.x) == (res.status, *res.x)
 
 
 @pytest.mark.parametrize(("kind", "seed", "budget"), [
@@ -279,12 +300,44 @@ def test_damped_x_is_continuous_where_a_bound_begins_to_act(name):
         assert np.abs(x[2] - x[1]).max() <= 1e-6
 
 
+def test_with_damping_a_row_that_acts_is_at_its_side_or_beyond():
+    """One that was missed acted for good, also where levels below had met it."""
+    recipe = Recipe(joints=(1, 14), levels=(1, 6), rows=(1, 9))
+    for seed in (141, 153, 1141):
+        h = generate(seed, recipe)
+        res = solved(make("hcod", damping=0.05), h)
+        value, norms = h.A @ res.x, np.linalg.norm(h.A, axis=1)
+        inside = np.where(res.active == 1, h.upper - value, value - h.lower)
+        assert (inside <= 1e-8 * norms)[np.abs(res.active) == 1].all()
+
+
+def test_a_row_of_zeros_does_not_end_the_damping_of_its_level():
+    """It made bounds of targets for single unknowns, which are not damped."""
+    A, asked = np.array([[1e-3, 0.0], [0.0, 1.0]]), np.array([1.0, 1.0])
+    bound, zeros = ([[0.0, 1.0]], [-np.inf], [0.5]), np.vstack([A, np.zeros((1, 2))])
+    x = [solved(make("hcod", damping=0.1), Hierarchy.from_levels([bound, level])).x for level in (
+        (A, asked), (zeros, [*asked, -1.0], [*asked, 1.0]))]
+    np.testing.assert_allclose(x[1], x[0], rtol=1e-12)
+    assert x[0][0] < 1.0
+
+
 def test_damped_x_does_not_hang_on_rounding_where_a_task_lies_along_an_exceeded_row():
     """What was left of the task, 1e-16, counted as a row; x moved by 1e-3."""
     a, b = np.random.default_rng(10).normal(size=(2, 1, 3))
     x = [solved(make("hcod", damping=0.1, threshold=3.0), Hierarchy.from_levels([
         (a, [-np.inf], [0.2]), (a * (1.0 + 1e-12 * k), [1.0]), (b, [1.0])])).x for k in range(9)]
     np.testing.assert_allclose(x, [x[0]] * 9, rtol=0.0, atol=1e-9)
+
+
+@pytest.mark.parametrize("power", [-480, 280, 330, 500])
+def test_a_factor_of_all_rows_changes_nothing(power):
+    """From 1e85 on the weight of a level that sets all of x overflowed: INACCURATE."""
+    for h in map(structured, (21, 46, 66, 211)):
+        other = Hierarchy.from_levels([(np.ldexp(A, power), np.ldexp(lower, power),
+                                        np.ldexp(upper, power)) for A, lower, upper in h.levels()],
+                                      h.reference)
+        res, again = HCOD.solve(h), HCOD.solve(other)
+        assert (again.status, again.iterations, *again.x) == (res.status, res.iterations, *res.x)
 
 
 @pytest.mark.filterwarnings("ignore:overflow")

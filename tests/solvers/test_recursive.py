@@ -210,8 +210,9 @@ def test_a_level_without_any_scaling_adds_nothing_and_scaling_what_is_missed_hel
 
 
 def test_bounds_that_exclude_each_other_are_named():
-    h = Hierarchy.from_levels([([[1, 0], [0, 1], [2, 0]], [-1, -1, 4], [1, 1, 6])],
-                              names=["limits"])
+    h = Hierarchy.from_levels([(np.empty((0, 2)), []),
+                               ([[1, 0], [0, 1], [2, 0]], [-1, -1, 4], [1, 1, 6])],
+                              names=["nothing", "limits"])
     with pytest.raises(HierarchyError, match=r"limits, row 2: 4 <= 2 x\[0\] <= 6 leaves nothing"):
         BASIC.solve(h)
     touching = Hierarchy.from_levels([([[3.0], [1.0]], [-1, 0.1], [0.3, 1])])

@@ -140,6 +140,17 @@ def test_levels_below_do_not_move_what_a_level_settled_on(inner):
     assert inner != "hcod" or (both.holds_back == -1).all()
 
 
+@pytest.mark.parametrize("inner", ["hcod", "sns", "tpm"])
+def test_a_level_without_rows_above_limits_changes_nothing(inner):
+    """The pace took the place of the limits, which `sns` and `tpm` then refused as a second level.
+    """
+    levels = [(np.eye(2), -np.ones(2), np.ones(2)), ([[1.0, 0.2]], [50.0])]
+    h = Hierarchy.from_levels(levels, names=["limits", "a"])
+    other = Hierarchy.from_levels([(np.empty((0, 2)), []), *levels], names=["none", *h.names])
+    x, again = (settled("a", inner=inner).solve(one).x for one in (h, other))
+    np.testing.assert_array_equal(again, x)
+
+
 def test_a_level_that_those_above_decide_does_not_slow_those_below():
     """As of two targets for one hand: what a posture does changes the second miss by nothing."""
     rng = np.random.default_rng(7)

@@ -47,7 +47,6 @@ from solvers.kernels.tolerances import (
     INDEPENDENT,
     LARGER,
     LEVEL_MET,
-    MET,
     PASS_STEPS,
     PATIENCE,
     SOLVE_STEPS,
@@ -94,22 +93,22 @@ def solve_hierarchy(A, lower, upper, sizes, x, record, settings, work):
     n = x.size
     if n + exact_size(n, lower.size, sizes.size) > work.size:
         return TOO_SMALL
-    code = _by_staircase(A, lower, upper, sizes, x, record, settings, work)
+    code = solve_equalities(A, lower, upper, sizes, x, record, settings, work)
     if code != UNPROVED:
         return code
     s, code, at = open_working_set(A, lower, upper, sizes, x, record, settings, work)
-    return answer(s, record, settings, work[at:]) if code == SOLVED else finish(x, code)
+    if code == SOLVED:
+        return answer(s, record, settings, work[at:])
+    keep_staircase(lower, upper, record)
+    return finish(x, code)
 
 
 @compiled
 def solve_equalities(A, lower, upper, sizes, x, record, settings, work):
-    """Solve what `solve_hierarchy` solves by the staircase, with little to compile, or UNPROVED."""
-    return _by_staircase(A, lower, upper, sizes, x, record, settings, work)
+    """Solve equalities whose pivots are clear, with little to compile.
 
-
-@inlined
-def _by_staircase(A, lower, upper, sizes, x, record, settings, work):
-    """Solve equalities whose pivots are clear; UNPROVED, with x as it was, of anything else."""
+    UNPROVED, with x as it was, of anything else; otherwise like `solve_hierarchy`.
+    """
     n = x.size
     if n > work.size:
         return TOO_SMALL
@@ -128,27 +127,25 @@ def _by_staircase(A, lower, upper, sizes, x, record, settings, work):
 @compiled
 def solve_damped(A, lower, upper, sizes, x, record, settings, work):
     """Like `solve_hierarchy`, level by level with damping; the record is no memory."""
-    (m, n), code, last = A.shape, SOLVED, sizes.size - 1
+    (m, n), last = A.shape, sizes.size - 1
     if work_size(n, m, sizes.size, True) > work.size:
         return TOO_SMALL
     if all_equal(lower, upper):
         return solve_hierarchy(A, lower, upper, sizes, x, record, settings, work)
-    d, at = carve_damped(work, 0, m, n, sizes.size)
+    d, at = carve_damped(work, m, n, sizes.size)
     reference, at = vector(work, at, n)
     limits, at = vector(work, at, settings.size)
     inner, at = vector(work, at, 3 * (m + n) + 3)
     assign(reference, x)
     for c in range(settings.size):
         limits[c] = settings[c] if c != DAMPING else 0.0
-    for i in range(record.size):
-        record[i] = -1.0 if m <= i < 2 * m or i == 3 * m + 2 else 0.0
-    met, staircase = open_damped(d, A, lower, upper, sizes, x, settings, work[at:])
-    if met or staircase == NUMERICAL_FAILURE:
+    keep_staircase(lower, upper, record)
+    code = open_damped(d, A, lower, upper, sizes, x, settings, work[at:])
+    if code != UNPROVED:
         assign(x, d.free)
-        keep_staircase(lower, upper, record)
-        return finish(x, staircase)
-    whole = last >= 0 and d.factor[last] > 0.0
-    for k in range(sizes.size + (not whole)):
+        return finish(x, code)
+    record[3 * m], code, count = 0.0, SOLVED, sizes.size + (last < 0 or d.factor[last] == 0.0)
+    for k in range(count):
         if code != SOLVED or (k <= last and d.factor[k] == 0.0):
             continue
         end = m if k > last else damp_level(d, k)
@@ -163,8 +160,8 @@ def solve_damped(A, lower, upper, sizes, x, record, settings, work):
             d.sizes[k] -= n
         _add_record(record, inner, lower, upper, d, x, end, k)
         limits[MOST] -= inner[3 * rows] + inner[3 * rows + 1]
-        if limits[MOST] < 1.0 and k <= last and code == SOLVED:
-            code = ITERATION_LIMIT
+        if limits[MOST] < 1.0 and k + 1 < count and code == SOLVED:
+            code, record[3 * m + 2] = ITERATION_LIMIT, min(k + 1, last)
         if k <= last:
             keep_reached(d, A, lower, upper, x, k, end)
     return code
@@ -182,29 +179,30 @@ def solve(A, lower, upper, sizes, x, record, settings, work):
 def _add_record(record, inner, lower, upper, d, x, end, k):
     """Add the result of a level: states of rows, and which rows hold it back.
 
-    A row that a level above has brought to its side stays active while x is there.
+    A row that a level above has brought to its side, or beyond it, stays active while x is there.
     """
     m, rows = lower.size, end + (x.size if k < d.factor.size else 0)
     for i in range(end):
-        missed = d.lower[i] < lower[i] or d.upper[i] > upper[i]  # by a level before
         stays = inner[i] == FREE and _stays(d.A[i], lower[i], upper[i], record[i], x)
-        record[i] = record[i] if missed or stays else inner[i]
+        record[i] = record[i] if stays else inner[i]
         if record[m + i] < 0.0 and 0.0 <= inner[rows + i] <= k:
             record[m + i], record[2 * m + i] = inner[rows + i], inner[2 * rows + i]
     record[3 * m] += inner[3 * rows]
     record[3 * m + 1] += inner[3 * rows + 1]
+    record[3 * m + 2] = inner[3 * rows + 2]
 
 
 @inlined
 def _stays(a, low, up, state, x):
-    """Whether x is at the side of a row that is active there by its state."""
+    """Whether x is at the side of a row that is active there by its state, or beyond it."""
     side = up if state > 0.0 else low
-    return abs(state) == 1.0 and abs(inner_product(a, x) - side) <= LEVEL_MET * (1.0 + abs(side))
+    inside = state * (side - inner_product(a, x))
+    return abs(state) == 1.0 and inside <= LEVEL_MET * (1.0 + abs(side))
 
 
 @inlined
 def keep_staircase(lower, upper, record):
-    """Write the record of an answer in which no inequality acts."""
+    """Write the record of an answer in which no inequality acts, or of a failure."""
     m = lower.size
     for i in range(m):
         record[i] = EQUAL if lower[i] == upper[i] else FREE
@@ -269,7 +267,7 @@ def _pass(s, saved, settings, share, seeded, most, work):
     """
     declared, rows = s.scalar[RANK], s.A.shape[0] + 1
     restore(s)
-    t, _ = carve_tableau(s, work, 0)
+    t = carve_tableau(s, work)
     s.scalar[RANK] = share * declared
     limit = min(most, PASS_STEPS * rows)
     code, level = pass_through_levels(t, settings[TOLERANCE], limit, seeded)
@@ -382,7 +380,7 @@ def verify_answer(A, lower, upper, sizes, x, record, settings, work):
                 restore(s)
                 take_up(s)
             meet(s, sizes.size)
-            write_multipliers(s, MET)
+            write_multipliers(s)
             assign(s.x, x[:n])
             proved = verify(s, True) and not neglects(s)
     return SOLVED if proved else INACCURATE if code == SOLVED else code

@@ -80,7 +80,6 @@ from solvers.kernels.active_set.working_set import (
     WHOLE,
     gives_all,
     product_with,
-    row_times_x,
     side_at,
 )
 from solvers.kernels.linalg.rows import length_of
@@ -141,7 +140,7 @@ def _hold_seeded(t, k, end, tolerance):
             continue
         s.index[STATE, i] = s.index[ACTED, i]
         side = side_at(s, i)
-        if abs(row_times_x(s, i) - side) <= tolerance * around(s, i, side, t.scalar[SCALE]):
+        if abs(product_with(s, i, s.x) - side) <= tolerance * around(s, i, side, t.scalar[SCALE]):
             _enter(t, i, end)
         else:
             s.index[STATE, i] = FREE
@@ -190,7 +189,7 @@ def _begin(t, k, last, whole, tolerance):
     measure(t, length_of(s.x))
     count[RANKS] = count[ROWS] = 0
     for i in range(s.index[FIRST, k] if k < s.multiplier.shape[0] - 1 else last, last):
-        value = row_times_x(s, i)
+        value = product_with(s, i, s.x)
         s.number[VALUE, i] = value
         if s.number[NORM, i] <= 0.0:
             s.index[KIND, i] = FIXED
@@ -237,12 +236,17 @@ def _write_multipliers(t, k, whole):
 @inlined
 def _pull_of_goal(t, begin, end):
     """Add the step from the goal, weighted, in the basis vectors begin .. end - 1."""
-    s = t.of
     for r in range(begin, end):
-        total, base = 0.0, t.count[BASE]
-        for c in range(s.x.size):
-            total += t.M[r, base + c] * (s.x[c] - s.number[GOAL, c])
-        s.number[PULL, r] += t.scalar[WEIGHT] * total
+        t.of.number[PULL, r] -= t.scalar[WEIGHT] * _way_to_goal(t, r)
+
+
+@inlined
+def _way_to_goal(t, r):
+    """Return the step from x to the goal in basis vector r."""
+    s, total, base = t.of, 0.0, t.count[BASE]
+    for c in range(s.x.size):
+        total += t.M[r, base + c] * (s.number[GOAL, c] - s.x[c])
+    return total
 
 
 @inlined
@@ -251,7 +255,7 @@ def _watch_parallel(t, last):
     for i in range(last):
         if t.of.index[KIND, i] == PARALLEL:
             t.of.index[KIND, i] = WATCHED
-            t.of.number[VALUE, i] = row_times_x(t.of, i)
+            t.of.number[VALUE, i] = product_with(t.of, i, t.of.x)
 
 
 @inlined
@@ -264,7 +268,7 @@ def _aim(t, whole):
     t.count[RANKS] = pivot_rows(t, begin, t.count[RANKS])
     for q in range(t.count[ROWS]):
         i = s.index[LIST, q]
-        s.number[VALUE, i] = row_times_x(s, i)
+        s.number[VALUE, i] = product_with(s, i, s.x)
         s.number[REST, q] = rest = side_at(s, i) - s.number[VALUE, i]
         t.scalar[SIZE] = max(t.scalar[SIZE], abs(rest) / s.number[NORM, i])
     t.scalar[REACH] = step_of_rows(t, begin, t.count[RANKS])
@@ -274,14 +278,10 @@ def _aim(t, whole):
 @inlined
 def _head_for_goal(t, begin):
     """Write the step towards the goal, in basis vectors."""
-    s, goal, x, base = t.of, t.of.number[GOAL], t.of.x, t.count[BASE]
     t.scalar[REACH] = 0.0
-    for r in range(begin, x.size):
-        total = 0.0
-        for c in range(x.size):
-            total += t.M[r, base + c] * (goal[c] - x[c])
-        s.number[Z, r] = total
-        t.scalar[SIZE] = max(t.scalar[SIZE], abs(total))
+    for r in range(begin, t.of.x.size):
+        t.of.number[Z, r] = step = _way_to_goal(t, r)
+        t.scalar[SIZE] = max(t.scalar[SIZE], abs(step))
 
 
 @inlined
@@ -411,7 +411,7 @@ def _leave(t, i, last, tolerance):
 
     A soft row that is now beyond its other side stays, at that side.
     """
-    s, was, value = t.of, t.of.index[STATE, i], row_times_x(t.of, i)
+    s, was, value = t.of, t.of.index[STATE, i], product_with(t.of, i, t.of.x)
     s.number[VALUE, i] = value
     if s.index[KIND, i] == SOFT:
         side = missed_side(s, i, value, t.scalar[SCALE], tolerance)
@@ -486,10 +486,7 @@ def _settle(t, k, whole):
 @inlined
 def _has_misses(s, k):
     """Whether rows of level k are missed that were settled before its first step."""
-    missed = False
-    for i in range(s.index[FIRST, k], s.index[FIRST, k + 1]):
-        missed |= s.multiplier[k, i] != 0.0
-    return missed
+    return s.multiplier[k, s.index[FIRST, k]:s.index[FIRST, k + 1]].any()
 
 
 @inlined
@@ -516,7 +513,7 @@ def _order(t, whole):
             at = _own(t, i, at, end)
             if at == before:
                 kind[i], s.index[STATE, i] = WATCHED, FREE
-                s.number[VALUE, i] = row_times_x(s, i)
+                s.number[VALUE, i] = product_with(s, i, s.x)
     count[HARD] = at - count[FIX]
     _close_columns(t)
 

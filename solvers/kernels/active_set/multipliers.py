@@ -42,25 +42,22 @@ from solvers.kernels.active_set.working_set import ZEROED as FORCE
 from solvers.kernels.linalg.least_squares import turn
 from solvers.kernels.linalg.rows import length_of, reflect
 from solvers.kernels.linalg.space import fill, matrix
-from solvers.kernels.tolerances import CANCELLED, EPSILON, FAINT, NEGLIGIBLE, SHADOW
+from solvers.kernels.tolerances import CANCELLED, EPSILON, FAINT, MET, NEGLIGIBLE, SHADOW
 from solvers.status import EQUAL
 
 OUTWARD, UNDECIDED, INWARD = 1, 0, -1
 
 
 @internal
-def write_multipliers(s, tolerance):
-    """Write the multipliers of all listed rows, and the sign of the first that is not zero.
-
-    tolerance: violations of a level below it, relative to the terms of its rows, count as zero.
-    """
+def write_multipliers(s):
+    """Write the multipliers of all listed rows, and the sign of the first that is not zero."""
     levels, whole = s.multiplier.shape[0] - 1, s.count[WHOLE]
     reach = length_of(s.x) + SHADOW * s.scalar[SIZE]
     for p in range(levels + 1):
         fill(s.multiplier[p], 0.0)
     last = levels if whole < 0 else whole
     for k in range(last):
-        _write_violations(s, k, reach, tolerance)
+        _write_violations(s, k, reach)
     weight = 1.0
     if whole >= 0:
         weight = s.number[NORM, s.index[FIRST, whole]] ** 2
@@ -72,12 +69,12 @@ def write_multipliers(s, tolerance):
 
 
 @inlined
-def _write_violations(s, k, reach, tolerance):
+def _write_violations(s, k, reach):
     """Write the violations of the listed rows of level k, zero if all of them are rounding."""
     begin, end, missed, most = s.index[BEGIN, k], s.index[BEGIN, k + 1], False, 0.0
     for q in range(begin, end):
         i = s.index[LIST, q]
-        least = tolerance * (s.number[NORM, i] * reach + abs(side_at(s, i)))
+        least = MET * (s.number[NORM, i] * reach + abs(side_at(s, i)))
         missed |= abs(s.number[MISS, q]) > least
         most = max(most, abs(s.number[MISS, q]))
     for q in range(begin, end):
@@ -99,11 +96,10 @@ def _pull(s, p, reach):
         s.number[GRADIENT, t] = s.number[NOISE, t] = 0.0
     for q in range(begin, end):
         i = s.index[LIST, q]
-        least, far = min(least, s.number[NORM, i]), max(far, abs(s.multiplier[p, i]))
+        s.number[FORCE, q] = force = s.multiplier[p, i]
+        least, far = min(least, s.number[NORM, i]), max(far, abs(force))
     if far == 0.0 or above == 0:
         return False
-    for q in range(begin, end):
-        s.number[FORCE, q] = s.multiplier[p, s.index[LIST, q]]
     _add_rows(s, p, least, reach, far)
     return True
 

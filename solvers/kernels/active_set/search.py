@@ -8,8 +8,6 @@ raises a strictly convex dual, so in exact arithmetic none recurs; where one doe
 decide, and the search ends.
 """
 
-from typing import NamedTuple
-
 import numpy as np
 
 from hierarchy.jit import inlined, internal
@@ -41,10 +39,9 @@ from solvers.kernels.active_set.working_set import (
     value_at,
 )
 from solvers.kernels.linalg.rows import length_of
-from solvers.kernels.linalg.space import View, assign, fill
+from solvers.kernels.linalg.space import assign, fill
 from solvers.kernels.tolerances import (
     EPSILON,
-    MET,
     NEGLIGIBLE,
     RECURRENCES,
     RESTORED,
@@ -58,18 +55,11 @@ from solvers.status import EQUAL, FREE, INACCURATE, NUMERICAL_FAILURE, SOLVED, U
 LEAVES = 5    # change of a row that acts; else the side at which it is to act, or 0
 
 
-class Found(NamedTuple):
-    """What is wrong with a working set: rows to change, rows to leave, the most violated row."""
-
-    wrong: View
-    leaving: View
-    most: View
-
-
 @internal
 def judge(s, last, newest):
-    """Write the changes that a working set asks for in the first `last` levels; see `Found`.
+    """Write the changes that a working set asks for in the first `last` levels.
 
+    Returns the number of rows to change, of those to leave, and the most violated row, -1 for none.
     newest: a row that entered because it was violated, so that it pushes; -1 for none.
     """
     wrong, leaving, most, worst = 0, 0, -1, 0.0
@@ -95,7 +85,7 @@ def judge(s, last, newest):
             wrong += 1
             if over > worst * norm:
                 most, worst = i, over / norm
-    return Found(wrong + leaving, leaving, most)
+    return wrong + leaving, leaving, most
 
 
 @inlined
@@ -130,19 +120,19 @@ def pivot_in_blocks(s, limit, patience):
     while tries < limit:
         tries += 1
         meet(s, levels)
-        write_multipliers(s, MET)
+        write_multipliers(s)
         if not _points_inward(s):
             if verify(s, True):
                 return SOLVED, tries
             _heed(s)
-        found = judge(s, levels, -1)
-        if found.wrong == 0:
+        wrong, leaving, _ = judge(s, levels, -1)
+        if wrong == 0:
             s.count[SOUND] = 0  # x is no longer that of an earlier set
             return INACCURATE, tries
-        if found.wrong == found.leaving < s.index[BEGIN, levels]:
+        if wrong == leaving < s.index[BEGIN, levels]:
             _keep_sound(s)
-        left = max(left, patience) if found.wrong < best else left - 1
-        best = min(best, found.wrong)
+        left = max(left, patience) if wrong < best else left - 1
+        best = min(best, wrong)
         if left < 0:
             break
         for i in range(s.A.shape[0]):
@@ -194,22 +184,22 @@ def pivot_one_by_one(s, current, saved, limit, level):
         if recurred > RECURRENCES:
             break
         meet(s, last)
-        write_multipliers(s, MET)
-        found = judge(s, last, newest)
+        write_multipliers(s)
+        wrong, leaving, most = judge(s, last, newest)
         if not np.isfinite(length_of(s.x)):
             return NUMERICAL_FAILURE, tries, last - 1.0
-        if found.wrong > 0:
+        if wrong > 0:
             _drop_rounding(s)
-        if found.wrong > 0 and slices >= SLICED:
+        if wrong > 0 and slices >= SLICED:
             _change_first(s)
-        elif found.leaving > 0 and fresh:
+        elif leaving > 0 and fresh:
             _release_all(s)
-        elif found.leaving > 0:
+        elif leaving > 0:
             _release_first(s, current)
-        elif found.most >= 0:
+        elif most >= 0:
             assign(s.index[SEED], s.index[STATE])
-            _enter(s, current, found.most)
-            newest, fresh, accepted = found.most, False, accepted + 1
+            _enter(s, current, most)
+            newest, fresh, accepted = most, False, accepted + 1
         elif last < levels:
             save(s, saved, last)
             last, newest, fresh, slices = _next_level(s, last), -1, True, 0.0

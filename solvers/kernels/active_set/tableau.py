@@ -76,16 +76,16 @@ def tableau_size(n, m):
 
 
 @inlined
-def carve_tableau(s, work, at):
-    """Return a Tableau of a WorkingSet, and where it ends."""
+def carve_tableau(s, work):
+    """Return a Tableau of a WorkingSet."""
     m, n = s.A.shape
     general = 0
     for i in range(m):
         general += s.index[UNIT, i] < 0
-    count, at = integers(work, at, 9)
+    count, at = integers(work, 0, 9)
     scalar, at = vector(work, at, 5)
     M, at = matrix(work, at + (-at & 3), n, general + n)
-    return Tableau(s, count, scalar, M, work[at:]), at
+    return Tableau(s, count, scalar, M, work[at:])
 
 
 @internal
@@ -111,13 +111,8 @@ def add_column(t, i):
     s, at = t.of, t.count[TURNING] - 1
     if s.index[COLUMN, i] < 0:
         s.index[COLUMN, i], s.index[ROW, at], t.count[TURNING] = at, i, at
-        _write_column(t.M, at, t.count[BASE], s.A[i])
-
-
-@internal
-def _write_column(M, at, base, a):
-    for r in range(M.shape[0]):
-        M[r, at] = inner_product(a, M[r, base:])
+        for r in range(s.x.size):
+            t.M[r, at] = inner_product(s.A[i], t.M[r, t.count[BASE]:])
 
 
 @inlined

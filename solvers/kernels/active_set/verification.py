@@ -48,7 +48,7 @@ from solvers.kernels.active_set.working_set import (
     UNIT,
     UPPER,
     WHOLE,
-    row_times_x,
+    product_with,
 )
 from solvers.kernels.linalg.rows import length_of
 from solvers.kernels.linalg.space import fill
@@ -101,7 +101,7 @@ def neglects(s):
     """Whether x violates a row that is ignored because rows of other levels are far larger."""
     missed, reach = False, 1.0 + length_of(s.x)
     for i in range(s.A.shape[0] if s.count[NEGLECTED] > 0 else 0):
-        value = row_times_x(s, i)
+        value = product_with(s, i, s.x)
         over = max(value - s.number[UPPER, i], s.number[LOWER, i] - value)
         missed = missed or over > BAND * -s.number[NORM, i] * reach > 0.0
     return missed
@@ -128,13 +128,13 @@ def _rows_hold(s, reach):
 @inlined
 def _row_holds(s, k, i, reach):
     """Whether (1) holds for row i of level k."""
-    value, low, up = row_times_x(s, i), s.number[LOWER, i], s.number[UPPER, i]
+    value, low, up = product_with(s, i, s.x), s.number[LOWER, i], s.number[UPPER, i]
     side, state = low if s.index[STATE, i] < 0 else up, s.index[STATE, i]
     if state == FREE:
         beyond, terms = max(value - up, low - value) * FREE_ROWS, abs(value)
     else:
         beyond, terms = abs(value - side - s.multiplier[k, i]), abs(value) + abs(side)
-    shift = BAND * s.number[NORM, i] + max(s.number[CUT, i], 0.0)
+    shift = BAND * s.number[NORM, i] + s.number[CUT, i]
     return beyond <= shift * reach + EPSILON * terms
 
 
@@ -211,7 +211,7 @@ def _sides_are_clear(s, reach):
     """Whether no row is off its side by more than rounding, but so little that it is forgiven."""
     clear = True
     for i in range(s.A.shape[0]):
-        value, low, up = row_times_x(s, i), s.number[LOWER, i], s.number[UPPER, i]
+        value, low, up = product_with(s, i, s.x), s.number[LOWER, i], s.number[UPPER, i]
         beyond, scale = max(value - up, low - value), s.number[NORM, i] * reach
         clear = clear and not MET * scale < beyond <= BAND * scale
     return clear

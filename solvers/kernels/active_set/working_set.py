@@ -101,13 +101,14 @@ def carve_working_set(A, sizes, x, multiplier, work, at):
 def load(s, lower, upper, sizes, record, rank_tolerance):
     """Check and copy the data; return SOLVED, or NUMERICAL_FAILURE if an entry is not finite.
 
-    Or UNPROVED if squares of the rows leave the range of numbers, so that all must be rescaled.
+    Or UNPROVED if fourth powers of the norms leave the range of numbers, so that all must be
+    rescaled: a level that sets all of x weighs with the square of its norm, squared for a length.
     The sides at which rows act are those of the record, as far as a row has that side.
     A row counts as zero beside a far larger one of its level; beside one of another level it has a
     negative norm, takes no part, and `neglects` says whether x meets it all the same.
     """
     number, index, first, sane = s.number, s.index, 0, True
-    s.scalar[TOLERANCE] = rank_tolerance
+    s.scalar[TOLERANCE] = max(rank_tolerance, CANCELLED)
     s.count[DIRTY] = s.count[FACTORED] = s.count[PICKED] = 0
     for c in range(s.x.size):
         sane &= np.isfinite(s.x[c])
@@ -130,7 +131,7 @@ def load(s, lower, upper, sizes, record, rank_tolerance):
     start_from(s, record)
     if not sane:
         return NUMERICAL_FAILURE
-    in_range = most == 0.0 or LEAST_SQUARE < most * most < 1.0 / LEAST_SQUARE
+    in_range = most == 0.0 or LEAST_SQUARE < most**4 < 1.0 / LEAST_SQUARE
     return SOLVED if in_range else UNPROVED
 
 
@@ -223,13 +224,7 @@ def take_up(s):
 @inlined
 def value_at(s, i):
     """Return row i, as it is after cuts, times x."""
-    return inner_product(s.C[i], s.x) if s.number[CUT, i] > 0.0 else row_times_x(s, i)
-
-
-@inlined
-def row_times_x(s, i):
-    """Return row i of A times x."""
-    return product_with(s, i, s.x)
+    return inner_product(s.C[i], s.x) if s.number[CUT, i] > 0.0 else product_with(s, i, s.x)
 
 
 @inlined

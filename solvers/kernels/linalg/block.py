@@ -110,7 +110,7 @@ def orthogonalise_rows(W, U):
             for j in range(i + 1, W.shape[0]):
                 a, b = inner_product(W[i], W[i]), inner_product(W[j], W[j])
                 c = inner_product(W[i], W[j])
-                if abs(c) <= np.sqrt(ORTHOGONAL) * np.sqrt(a) * np.sqrt(b):  # c^2 may overflow
+                if abs(c) <= ORTHOGONAL * np.sqrt(a) * np.sqrt(b):  # c^2 may overflow
                     continue
                 settled = False
                 zeta = (b - a) / (2.0 * c)

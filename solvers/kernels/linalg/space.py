@@ -13,6 +13,7 @@ passed to inlined helpers, costs nothing.
 from typing import Any, NamedTuple
 
 from hierarchy.jit import as_integers, as_matrix, inlined
+from solvers.kernels.tolerances import CANCELLED
 
 View = Any  # an array to the reader; numba infers a type
 
@@ -49,8 +50,8 @@ class Settings(NamedTuple):
 
 @inlined
 def shared(settings):
-    """Return the Settings at the start of an array of settings."""
-    return Settings(settings[0], settings[1], settings[2])
+    """Return the Settings at the start of an array of settings; remainders may be rounding."""
+    return Settings(settings[0], settings[1], max(settings[2], CANCELLED))
 
 
 @inlined
