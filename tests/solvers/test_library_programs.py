@@ -16,7 +16,7 @@ import pytest
 from rank_cases import sequence
 
 from benchmark.studies import recorded
-from hierarchy import HierarchyError, Robot, Stack, State
+from hierarchy import Hierarchy, HierarchyError, Robot, Stack, State
 from hierarchy.paths import Still
 from hierarchy.tasks import JointLimits, Position
 from scenarios.problems.recorded import family
@@ -138,6 +138,12 @@ def test_many_solves_allocate_nothing_and_touch_no_new_page(folder, tmp_path, na
     solves, failed, allocated, faults, *_ = map(int, said(
         program, tmp_path / "ticks", resolver, "200000").split())
     assert (solves, failed, allocated, faults) == (200_000, 0, 0, 0)
+
+
+def test_ticks_of_a_stack_that_switches_are_no_sequence_of_one_shape(tmp_path):
+    shapes = [Hierarchy.from_levels([(np.eye(2)[:m], np.zeros(m))]) for m in (1, 1, 2)]
+    with pytest.raises(HierarchyError, match=r"tick 2 has levels of \[2\] rows, tick 0 of \[1\]"):
+        recorded.record_sequence(tmp_path / "ticks", shapes)
 
 
 @needs_c
