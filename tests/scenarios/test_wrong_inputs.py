@@ -50,6 +50,11 @@ def test_sections_of_another_kind_are_replaced_by_a_file_that_extends_and_by_key
         assert load("ellipse", changes).position.path.times == (0.0, 1.0)
 
 
+def test_check_says_that_no_starts_can_be_drawn_from_a_variation_of_unknown_keys():
+    said, = first_tick(load("ellipse", {"variation": {"start.qq": {"around": 0.1}}})).warnings
+    assert said.startswith("no sampled starts: variation.start.qq: scenario 'ellipse': unknown key")
+
+
 def test_rounding_of_a_robot_at_rest_at_its_targets_is_not_said_to_be_missed():
     """A posture was missed by 1.42e-14, held back by grip and tray."""
     hand, grip = {"frame": "right_hand"}, {"frame": "left_hand", "to": "right_hand"}
