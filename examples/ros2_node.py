@@ -1,14 +1,14 @@
 """A ROS 2 node that sends joint velocities out of a stack of tasks.
 
-This file is only checked for its syntax: it has never run, for this project is tested without
-ROS 2. Read it as a start for a node of your own, and try that in simulation first.
+It is tested with stubs in place of ROS 2 only. Read it as a start for a node of your own, and try
+that in simulation first.
 
     python ros2_node.py --ros-args -p urdf:=/path/to/robot.urdf -p end_effector:=tool0
 
 It reads /joint_states, brings the end effector to the last point of /goal
 (geometry_msgs/PointStamped in the base frame), and publishes velocities for a
 forward_command_controller on /forward_velocity_controller/commands. Joint states that are older
-than `stale` seconds, or an answer that is not proved, send zeros.
+than `stale` seconds or not finite, or an answer that is not verified, send zeros.
 """
 
 import numpy as np
@@ -55,17 +55,19 @@ class TaskHierarchyNode(Node):
                                       throttle_duration_sec=5.0)
             return
         read = np.array([known[name] for name in self.robot.joint_names])
-        self.q = (self.robot.configuration(read) if np.isfinite(read).all()
+        finite = np.isfinite(read).all()
+        self.q = (self.robot.configuration(read) if finite
                   else np.full(self.robot.nq, np.nan))  # which `move` refuses
         self.read_at = self.get_clock().now()
-        if self.state is None:
+        if self.state is None and finite:
             self.state = State.at(self.robot, self.q)
             self.go_to(self.state.position(self.hand))
 
     def on_goal(self, message: PointStamped) -> None:
-        """Go to another point."""
-        if self.state is not None:
-            self.go_to(np.array([message.point.x, message.point.y, message.point.z]))
+        """Go to another point, if it is finite."""
+        point = np.array([message.point.x, message.point.y, message.point.z])
+        if self.state is not None and np.isfinite(point).all():
+            self.go_to(point)
 
     def go_to(self, point: np.ndarray) -> None:
         """Make a stack whose hand goes to a point [m]."""

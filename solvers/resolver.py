@@ -49,8 +49,9 @@ def number(default: Any = dataclasses.MISSING, low: float = 0.0, high: float = m
             return
         found = as_float(value)
         if not low <= found < high or (open_below and found == low):
+            below = "<" if float(f"{high:g}") == high else "<="  # the next number above a round one
             raise HierarchyError(f"{resolver.name}: {name} = {value!r}, expected a number "
-                                 f"{'>' if open_below else '>='} {low:g} and < {high:g}")
+                                 f"{'>' if open_below else '>='} {low:g} and {below} {high:g}")
         if type(value) is not float:
             set_frozen(resolver, **{name: found})
 

@@ -1,4 +1,4 @@
-"""What `hierarchy COMMAND --help` prints, for every command.
+"""What `hierarchy COMMAND --help` prints, for every command and those below it.
 
 A page that has the line `<!-- help of every command -->` gets it there.
 """
@@ -25,6 +25,12 @@ def _sections():
 
     from scenarios.cli.main import app
 
-    for name, command in typer.main.get_command(app).commands.items():
-        context = command.make_context(f"hierarchy {name}", [], resilient_parsing=True)
-        yield f"## {name}\n\n```text\n{command.get_help(context)}\n```\n"
+    yield from _helps("", typer.main.get_command(app).commands)
+
+
+def _helps(above, commands):
+    for name, command in commands.items():
+        whole = f"{above}{name}"
+        context = command.make_context(f"hierarchy {whole}", [], resilient_parsing=True)
+        yield f"## {whole}\n\n```text\n{command.get_help(context)}\n```\n"
+        yield from _helps(f"{whole} ", getattr(command, "commands", {}))

@@ -51,7 +51,8 @@ int main(void) {
       memset(v, 0, sizeof v);
       ++braked;
     }
-    for (int i = 0; i < JOINTS; ++i) {
+    for (int i = 0; i < JOINTS; ++i) { /* the guard of what is not verified: it may leave its bounds */
+      v[i] = fmax(lower[i], fmin(upper[i], v[i]));
       limited += record.values[i] == 1.0 || record.values[i] == -1.0;
       q[i] += PERIOD * v[i];
     }

@@ -32,7 +32,7 @@ class EffortController : public controller_interface::ControllerInterface {
  public:
   CallbackReturn on_init() override {
     pinocchio::urdf::buildModelFromXML(get_robot_description(), model_);
-    if (model_.nv != JOINTS || !model_.existFrame(HAND) || !th_matches())
+    if (model_.nq != JOINTS || model_.nv != JOINTS || !model_.existFrame(HAND) || !th_matches())
       return CallbackReturn::ERROR;
     data_ = pinocchio::Data(model_);
     hand_ = model_.getFrameId(HAND);
@@ -66,6 +66,7 @@ class EffortController : public controller_interface::ControllerInterface {
     const bool answered = status == TH_SOLVED || status == TH_INACCURATE;
     torque_ = data_.nle - POSTURE_DAMPING * v_; // without an answer: gravity, and brake
     if (answered) torque_ = data_.nle + data_.M * solver_.answer();
+    if (!torque_.allFinite()) torque_.setZero(); // what was read is not finite
     for (int i = 0; i < JOINTS; ++i) {
       const double limit = model_.upperEffortLimit[i];
       command_interfaces_[i].set_value(std::clamp(torque_[i], -limit, limit));

@@ -1,6 +1,8 @@
 // A controller of ros2_control for the velocities of a KUKA LWR IV: first the limits of the joints,
 // then the hand at a goal. It has been compiled against the headers in stub/ only, never against
 // ROS 2, and has moved nothing but the simulated arm in simulated.cpp.
+#include <algorithm>
+#include <array>
 #include <string>
 
 #include "arm.hpp"
@@ -43,16 +45,18 @@ class HierarchyController : public controller_interface::ControllerInterface {
   return_type update(const rclcpp::Time &, const rclcpp::Duration &period) override {
     const arm::Joints q = angles();
     const arm::Vector hand = arm::hand(q, solver_.row(arm::JOINTS));
+    std::array<std::array<double, 2>, arm::JOINTS> box;
     for (int i = 0; i < arm::JOINTS; ++i) {
       const double v = state_interfaces_[arm::JOINTS + i].get_value();
-      const auto [low, up] = arm::box(i, q[i], v, ACCELERATION, period.seconds());
-      solver_.sides(i, low, up);
+      box[i] = arm::box(i, q[i], v, ACCELERATION, period.seconds());
+      solver_.sides(i, box[i][0], box[i][1]);
     }
     for (int k = 0; k < 3; ++k) solver_.sides(arm::JOINTS + k, GAIN * (goal_[k] - hand[k]));
     const th_status status = solver_.solve();
     const bool answered = status == TH_SOLVED || status == TH_INACCURATE;
-    for (int i = 0; i < arm::JOINTS; ++i)
-      command_interfaces_[i].set_value(answered ? solver_.x()[i] : 0.0);
+    for (int i = 0; i < arm::JOINTS; ++i)  // the guard of what is not verified: it may leave the box
+      command_interfaces_[i].set_value(
+          answered ? std::clamp(solver_.x()[i], box[i][0], box[i][1]) : 0.0);
     return answered ? return_type::OK : return_type::ERROR;
   }
 

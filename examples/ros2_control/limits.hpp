@@ -16,7 +16,7 @@ struct Joint {
 
 // The velocity from which a joint that loses A T per tick comes to rest after the distance s.
 inline double fastest(double s, double A, double T) {
-  const double distance = std::fabs(s);
+  const double distance = std::min(std::fabs(s), 1e100);  // a joint without limits is at infinity
   const double k = std::floor((std::sqrt(1 + 8 * distance / (A * T * T)) - 1) / 2);
   const double w = k * A * T + (distance - k * (k + 1) / 2 * A * T * T) / ((k + 1) * T);
   return s >= 0 ? w : -w;

@@ -13,6 +13,7 @@ from hierarchy.activation import Activation
 from hierarchy.allocation import AVOIDANCE, POINTING, POSITION, Allocation, allocate
 from hierarchy.avoidance import Measurement, Obstacles
 from hierarchy.contacts import Contacts
+from hierarchy.errors import check_name
 from hierarchy.jit import announce_compilation
 from hierarchy.problem import Array
 from hierarchy.tasks import Pointing, Separation
@@ -26,6 +27,7 @@ from scenarios.cell.sensors.camera import DepthCamera
 from scenarios.cell.sensors.sensor import sensor_of
 from scenarios.cell.tasks import Tasks, tasks_of
 from scenarios.config import Scenario, ScenarioError
+from scenarios.config.sections import naming
 from scenarios.config.sections.avoidance import AvoidanceSection
 from scenarios.config.sections.references import References
 from solvers import Resolver
@@ -155,13 +157,17 @@ def _rows(scenario: Scenario, tasks: Sequence[Task],
 def stack_resolver(scenario: Scenario, cell: Cell) -> Resolver:
     """Return the scenario's resolver, as the stack of its cell uses it.
 
-    Raises ScenarioError if the stack has activations and the resolver does not take them.
+    Raises ScenarioError if the stack has activations and the resolver does not take them, or lacks
+    a level that has a scale.
     """
     resolver, control = scenario.make_resolver(), scenario.control
     robot, stack, activation = cell.robot, cell.stack, cell.activation
     if isinstance(resolver, Merged):
-        scales = {name: stack[name].scale for name in stack.names}
-        resolver = replace(resolver, scales=scales | dict(resolver.scales))
+        scales, given = {name: stack[name].scale for name in stack.names}, dict(resolver.scales)
+        with naming("control.options.scales"):
+            for name in given:
+                check_name("level", name, scales)
+        resolver = replace(resolver, scales=scales | given)
     if control.stack == "set-based":
         return SetBased(inner=resolver)
     if activation is None and (control.level != "velocity" or control.damping == 0.0):

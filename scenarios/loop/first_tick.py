@@ -8,7 +8,8 @@ from hierarchy.tasks.pairs import inseparable_pairs
 from hierarchy.tasks.separation import SelfSeparation
 from hierarchy.words import listed
 from scenarios.cell.build import Cell
-from scenarios.config import Scenario
+from scenarios.config import Scenario, ScenarioError
+from scenarios.config.sampling import changed, drawn
 from scenarios.config.validation import doubtful_units
 from scenarios.loop.controller import Controller
 from scenarios.loop.faults import check
@@ -48,10 +49,19 @@ def first_tick(scenario: Scenario) -> FirstTick:
     controller = _after_one(scenario)
     distances = _distances(controller)
     unmet = tuple(_unmet(controller)) if controller.answered else ()
-    warnings = (*_warnings(scenario, distances), *_itself(controller.cell), *footing(controller))
+    warnings = (*_warnings(scenario, distances), *_itself(controller.cell), *footing(controller),
+                *_undrawn(scenario))
     status, levels = (controller.resolution.status, controller.hierarchy.names) \
         if controller.answered else (None, ())
     return FirstTick(status, levels, unmet, distances, warnings)
+
+
+def _undrawn(scenario: Scenario) -> Iterator[str]:
+    """Yield why no start can be drawn from the [variation] of a scenario."""
+    try:
+        changed(scenario, drawn(scenario, scenario.variation, 0, 0), "variation")
+    except ScenarioError as error:
+        yield f"no sampled starts: {error}".removesuffix(".")
 
 
 def contact_warnings(scenario: Scenario) -> tuple[str, ...]:

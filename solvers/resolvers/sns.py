@@ -21,7 +21,7 @@ class Sns(Resolver):
     """Saturation in the null space, inside a box given by the rows of the first level.
 
     The first level holds one- or two-sided bounds on single unknowns; without any inequality the
-    answer is that of `tpm`, to the last digit. x stays inside the box, and lower tasks do not
+    answer is that of `recursive`. x stays inside the box, and lower tasks do not
     change the values of upper levels. The answer is not optimal: it depends on the sets of
     saturated joints that were tried. Algorithm, departures and sources:
     docs/theory/sns.md.

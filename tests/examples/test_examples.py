@@ -1,7 +1,10 @@
 """The examples run, and print what they promise: strict levels beside how it is done otherwise."""
 
+import sys
 from pathlib import Path
 from runpy import run_path
+from types import SimpleNamespace
+from unittest.mock import MagicMock
 
 import numpy as np
 import pytest
@@ -46,3 +49,44 @@ def test_two_hands_hold_their_tray_and_with_equal_weights_do_not():
     apart = [np.linalg.norm(run["task_error_grip"][:, :3], axis=1).max() for run in (strict, equal)]
     assert apart[0] < 0.002
     assert apart[1] > 0.05
+
+
+class Node:
+    """A node of ROS 2 whose parameters are the defaults, but for the robot."""
+
+    def __init__(self, name):
+        self.get_logger = self.create_subscription = self.create_timer = MagicMock()
+        self.create_publisher, self.get_clock = MagicMock(), MagicMock()
+
+    def declare_parameter(self, name, default):
+        given = {"urdf": str(EXAMPLES / "robots" / "iiwa14.urdf"), "end_effector": "tool0"}
+        return SimpleNamespace(value=given.get(name, default))
+
+
+def test_the_ros2_node_sends_zeros_on_bad_readings_and_ignores_bad_goals(monkeypatch):
+    for name in ("rclpy", "rclpy.node", "rclpy.qos", "geometry_msgs.msg", "sensor_msgs.msg",
+                 "std_msgs.msg"):
+        monkeypatch.setitem(sys.modules, name, MagicMock())
+    sys.modules["rclpy.node"].Node = Node
+    sys.modules["std_msgs.msg"].Float64MultiArray = lambda data: data
+    node = run_path(str(EXAMPLES / "ros2_node.py"))["TaskHierarchyNode"]()
+    clock, names = node.get_clock.return_value.now, node.robot.joint_names
+    clock.return_value.nanoseconds = 0
+    clock.return_value.__sub__.return_value.nanoseconds = 0
+
+    def sent(joints, goal=None):
+        node.on_joints(SimpleNamespace(name=names, position=[joints] * 7))
+        if goal is not None:
+            node.on_goal(SimpleNamespace(point=SimpleNamespace(x=goal, y=0.2, z=0.4)))
+        node.tick()
+        return np.abs(node.commands.publish.call_args[0][0]).max()
+
+    node.on_joints(SimpleNamespace(name=names, position=[np.nan] * 7))
+    node.tick()
+    node.commands.publish.assert_not_called()
+    assert sent(0.2) < 1e-9
+    assert sent(0.2, goal=0.5) > 0.01
+    assert sent(0.2, goal=np.nan) > 0.01
+    assert sent(np.nan) == 0.0
+    clock.return_value.__sub__.return_value.nanoseconds = 10**9
+    assert sent(0.2) == 0.0

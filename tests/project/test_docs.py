@@ -86,6 +86,12 @@ def test_every_public_name_is_in_the_reference(site):
     assert " at 0x" not in text, "a signature has an object in place of a type"
 
 
+def test_the_help_of_every_command_and_of_those_below_it_is_on_one_page(site):
+    page = (site[0] / "commands.html").read_text()
+    for command in ("run", "problems export", "bench open"):
+        assert f"Usage: hierarchy {command} " in page
+
+
 def public_names():
     """The names of what the packages export, but for plain values: there, and where it is from."""
     for package in (hierarchy, solvers, scenarios):

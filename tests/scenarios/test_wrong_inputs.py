@@ -24,6 +24,7 @@ WAYPOINTS = ["position.path.times=[0, 1]", "position.path.points=[[0, 0, 0], [0,
 @pytest.mark.parametrize(("name", "changes"), [
     ("ellipse", ["start.end_effector=[5, 5, 5]"]), ("ellipse", ["robot.model=ur5"]),
     ("stand-push", ["contacts.0.frame=left_fot"]),
+    ("stand-push-smooth", ['control.options.merged.scales={"least forc"=9.0}']),
     ("human", ["plant.kind=kinematic", "control.metric=mass", "sensor.latency=0.01"])])
 def test_what_does_not_fit_the_robot_is_said_by_check_and_run(
         name, changes, command, tmp_path, monkeypatch):
@@ -47,6 +48,11 @@ def test_sections_of_another_kind_are_replaced_by_a_file_that_extends_and_by_key
     for changes in (["position.path.kind=waypoints", *WAYPOINTS],
                     [*WAYPOINTS, "position.path.kind=waypoints"]):
         assert load("ellipse", changes).position.path.times == (0.0, 1.0)
+
+
+def test_check_says_that_no_starts_can_be_drawn_from_a_variation_of_unknown_keys():
+    said, = first_tick(load("ellipse", {"variation": {"start.qq": {"around": 0.1}}})).warnings
+    assert said.startswith("no sampled starts: variation.start.qq: scenario 'ellipse': unknown key")
 
 
 def test_rounding_of_a_robot_at_rest_at_its_targets_is_not_said_to_be_missed():

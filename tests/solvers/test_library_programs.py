@@ -16,7 +16,8 @@ import pytest
 from rank_cases import sequence
 
 from benchmark.studies import recorded
-from hierarchy import HierarchyError, Robot, Stack, State
+from hierarchy import Hierarchy, HierarchyError, Robot, Stack, State
+from hierarchy.limits import Limits
 from hierarchy.paths import Still
 from hierarchy.tasks import JointLimits, Position
 from scenarios.problems.recorded import family
@@ -94,6 +95,27 @@ def test_recorded_problems_of_a_standing_humanoid_give_the_same_bits_in_c(folder
 
 
 @pytest.mark.skipif(CXX is None, reason="no compiler of C++")
+def test_the_limits_of_ros2_control_are_those_of_python_also_for_a_joint_without_limits(tmp_path):
+    (tmp_path / "box.cpp").write_text("""
+#include <cstdio>
+#include "limits.hpp"
+int main() {
+  for (double far : {0.5, double(INFINITY)}) {
+    const limits::Joint joint{-far, far, 2.0, 10.0, 0.01};
+    const auto v = limits::velocities(joint, 0.3, 0.1), a = limits::accelerations(joint, 0.3, 0.1);
+    std::printf("%.17g %.17g %.17g %.17g ", v[0], v[1], a[0], a[1]);
+  }
+}""")
+    subprocess.run([CXX, "-std=c++17", "-I", ROS2, tmp_path / "box.cpp", "-o", tmp_path / "box"],
+                   check=True)
+    boxes = [Limits(*np.array([[-far], [far], [2.0], [10.0]]), 0.01).box(
+        np.array([0.3]), np.array([0.1]), level)
+        for far in (0.5, np.inf) for level in ("velocity", "acceleration")]
+    np.testing.assert_allclose(
+        np.array(said(tmp_path / "box").split(), dtype=float), np.ravel(boxes), rtol=1e-12)
+
+
+@pytest.mark.skipif(CXX is None, reason="no compiler of C++")
 def test_the_controller_of_ros2_control_sends_what_python_sends(folder, tmp_path):
     """Against stub headers: the same arm, tasks and period, with two writers of the rows."""
     program = built(tmp_path / "simulated", ROS2 / "simulated.cpp", folder, "-std=c++17", *STRICT,
@@ -138,6 +160,12 @@ def test_many_solves_allocate_nothing_and_touch_no_new_page(folder, tmp_path, na
     solves, failed, allocated, faults, *_ = map(int, said(
         program, tmp_path / "ticks", resolver, "200000").split())
     assert (solves, failed, allocated, faults) == (200_000, 0, 0, 0)
+
+
+def test_ticks_of_a_stack_that_switches_are_no_sequence_of_one_shape(tmp_path):
+    shapes = [Hierarchy.from_levels([(np.eye(2)[:m], np.zeros(m))]) for m in (1, 1, 2)]
+    with pytest.raises(HierarchyError, match=r"tick 2 has levels of \[2\] rows, tick 0 of \[1\]"):
+        recorded.record_sequence(tmp_path / "ticks", shapes)
 
 
 @needs_c

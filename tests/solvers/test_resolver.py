@@ -85,6 +85,8 @@ def test_the_programs_of_hqp_begin_at_a_memory_of_their_levels(form, monkeypatch
 def test_settings_of_parts_are_named():
     for scales, said in (({"hand": 0.0}, ": 'hand'"), (("hand",), " = ('hand',), expected")):
         refused(f"merged: scales{said}", make, "merged", scales=scales)
+    refused("step = 1.5, expected a number > 0 and <= 1", make, "merged", step=1.5)
+    assert make("merged", step=1).step == 1.0
     for name, key in (("hqp", "backend"), ("reverse", "form")):
         refused(f"{key} of {name}", make, name, **{key: np.zeros(2)}, error=UnknownNameError)
     assert make("hcod", max_iterations=2**31 - 1).max_iterations == 2147483647
