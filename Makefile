@@ -27,8 +27,8 @@ MAKEFLAGS  += --jobs=3
 ARRAYS     := .venv/arrays
 SMALL      := .venv/scenarios
 INSTALLED  := .venv/installed
-PIP        := $(BIN)/python -m pip install --quiet --disable-pip-version-check --progress-bar off \
-              --no-compile --constraint constraints.txt
+PIP        := env PYTHONWARNINGS=ignore $(BIN)/python -m pip install --quiet --no-compile \
+              --disable-pip-version-check --progress-bar off --constraint constraints.txt
 
 .DELETE_ON_ERROR:
 .PHONY: demo test quick bench stress reproduce docs dist clean set-up kernels solvers-o robots-o
@@ -127,5 +127,6 @@ $(ARRAYS): pyproject.toml constraints.txt
 	fi; \
 	echo "Setting up .venv with $$("$$python" --version) (once; downloads about 250 MB) ..."; \
 	"$$python" -m venv --clear .venv
+	-@$(PIP) --upgrade pip  # the pip of Python 3.11 takes twice the time
 	@$(PIP) numba scipy
 	@touch $@
