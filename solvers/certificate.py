@@ -364,6 +364,8 @@ def _least_change(cone: _NormalCone, level: _Rows, Z: Array, size: Array, judged
     own, own_size, own_t = _on_sides(level, size)
     C, terms = view.weighted(np.vstack([cone.rows @ (cone.Z.T @ Z),
                                         (own @ Z) * own_size[:, None]**2]))
+    unseen = _independent(C[view.rank:], terms[view.rank:], cone.parallel)
+    C, terms = np.vstack([C[:view.rank], unseen]), terms[:view.rank + len(unseen)]
     held = np.eye(len(own_t), C.shape[1], len(cone.rows))
     none, t = np.zeros(len(C) - view.rank), level.t[judged]
     f = np.concatenate([view.Q.T @ t, none, -np.maximum(own_t, 0.0)])
@@ -374,6 +376,21 @@ def _least_change(cone: _NormalCone, level: _Rows, Z: Array, size: Array, judged
     unknown[beyond] = np.maximum(unknown[beyond], cone.parallel)
     return _balanced(np.vstack([C, held]), np.vstack([terms, held]), f, sizes, unknown,
                      1e-3 * enough)
+
+
+def _independent(heavy: Array, terms: Array, parallel: float) -> Array:
+    """Return as many rows as are independent, up to that angle, with the span of rows (q, k).
+
+    Of dependent rows only rounding would remain, and theirs is larger than a light row. For the
+    same reason entries that are rounding of `terms` (q, k), the same in each row, become zero.
+    """
+    _, R, order = _qr(heavy)
+    pivots = np.abs(np.diagonal(R))
+    rank = int(np.count_nonzero(pivots > parallel * pivots.max(initial=0.0)))
+    rows = np.empty((rank, heavy.shape[1]))
+    rows[:, order] = R[:rank]
+    rows[np.abs(rows) <= _ROUNDING * terms[:rank]] = 0.0
+    return rows
 
 
 def _least_turn(cone: _NormalCone, level: _Rows, Z: Array, size: Array, judged: Mask
@@ -562,7 +579,7 @@ def _by_scipy(D: Array, b: Array) -> Array:
 
 def _active_set(D: Array, b: Array, unit: Array, enough: float, scale: float) -> Array:
     """Return y >= 0 that minimises |D y - b|, or reaches enough / scale; unit (D) picks columns."""
-    y, left, free = np.zeros(D.shape[1]), b, np.zeros(D.shape[1], dtype=bool)
+    y, left, free = _first_guess(D, b)
     refused, tried = np.zeros(len(y), dtype=bool), {free.tobytes()}
     for _ in range(3 * len(y) + 3):
         slopes, terms = unit.T @ left, np.abs(unit).T @ np.abs(left)
@@ -579,6 +596,20 @@ def _active_set(D: Array, b: Array, unit: Array, enough: float, scale: float) ->
             tried.add(free.tobytes())
             refused[:] = False
     return y
+
+
+def _first_guess(D: Array, b: Array) -> tuple[Array, Array, Mask]:
+    """Return the least squares of all columns, repeated without those that come out negative.
+
+    Returns y, the residual, and the mask of the free columns.
+    """
+    free = np.ones(D.shape[1], dtype=bool)
+    while free.any():
+        y, left = _least_squares(D, b, free)
+        if (y[free] > 0.0).all():
+            return y, left, free
+        free &= y > 0.0
+    return np.zeros(D.shape[1]), b, free
 
 
 def _freed(D: Array, b: Array, y: Array, free: Mask, new: int) -> tuple[Array, Array, Mask] | None:
