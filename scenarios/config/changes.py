@@ -44,8 +44,9 @@ def _value(text: str, what: str) -> Any:
 def change_all(data: dict[str, Any], changes: Mapping[str, Any], root: type[Section]) -> None:
     """Set values at dotted keys of the `data` of a `root` in place; absent tables are added.
 
-    A section that gets another kind starts anew, wherever that stands. Raises ScenarioError for a
-    key within something that is no table, or outside a list.
+    A section that gets another kind starts anew, wherever that stands, and what varied in it or in
+    one that becomes None varies no more. Raises ScenarioError for a key within something that is no
+    table, or outside a list.
     """
     expect("changes", changes, Mapping, "give {\"section.key\": value, ...}")
     tags = {}
@@ -54,13 +55,16 @@ def change_all(data: dict[str, Any], changes: Mapping[str, Any], root: type[Sect
         *path, last = key.split(".")
         tag = tag_at(root, path)
         tags[key] = tag if tag is not None and tag[0] == last else None
-    for key in sorted(changes, key=lambda key: tags[key] is None):  # kinds first, else as given
+    for key in sorted(changes, key=lambda key: (tags[key] is None, key.startswith("variation"))):
         with naming(key, of=ValueError):
             for one in matching(data, key):
                 table, last = place(data, one, add=True)
                 if table and _is_another_kind(table, {last: changes[key]}, tags[key]):
                     table.clear()
                     _vary_no_more(data, one.rpartition(".")[0])
+                below = table.get(last) if isinstance(table, dict) else None
+                if isinstance(below, dict) and _leaves(below, changes[key], root, key):
+                    _vary_no_more(data, one)
                 table[last] = changes[key]
 
 
@@ -138,6 +142,11 @@ def _lay(below: dict[str, Any], above: Mapping[str, Any], root: type[Section],
             yield ".".join(where)
         else:
             yield from _lay(under, value, root, where)
+
+
+def _leaves(below: Mapping[str, Any], value: Any, root: type[Section], key: str) -> bool:
+    return value is None or (isinstance(value, Mapping) and
+                             _is_another_kind(below, value, tag_at(root, key.split("."))))
 
 
 def _is_another_kind(below: Mapping[str, Any], above: Mapping[str, Any],

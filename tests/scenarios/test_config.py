@@ -55,6 +55,9 @@ def test_what_varies_of_a_section_of_another_kind_is_what_the_file_itself_says(t
         assert [key for key in load(file).variation if key.startswith("avoidance")] == kept
     file.write_text('extends = "ellipse"\nname = "mine"\nreplaces = ["avoidance"]\n')
     assert list(load(file).variation) == ["start.q"]  # nothing could be drawn for the other key
+    assert list(load("ellipse", {"avoidance": None}).variation) == ["start.q"]
+    frames = {"sensor": {"kind": "frames", "folder": "hand"}}
+    assert set(load("human").variation) - set(load("human", frames).variation) == {"sensor.seed"}
 
 
 def test_a_file_is_beside_the_one_that_names_it_or_in_the_working_directory_of_a_change(
