@@ -242,7 +242,7 @@ class _Search:
 
     def answer(self, q: Array, iterations: int, starts: int) -> Reached:
         """Return what is to be said of a configuration."""
-        self._errors(q)
+        self.state.move(self.t, q, np.zeros(self.robot.n))
         broken, errors = self._broken(q), {task.name: self._missed(task) for task in self.tasks}
         met = all(errors[task.name] <= self.until for task in self.deciding)
         if not met:
