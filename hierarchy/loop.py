@@ -319,10 +319,10 @@ def _quiet(pause_gc: bool, priority: int | None, notes: list[str]) -> Iterator[N
     before = None
     if priority is not None:
         try:
-            before = os.sched_getscheduler(0), os.sched_getparam(0)
+            policy = os.sched_getscheduler(0), os.sched_getparam(0)
             os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(priority))
+            before = policy
         except (OSError, AttributeError, ValueError) as error:
-            before = None
             notes.append(f"SCHED_FIFO at priority {priority} was not given: {error}")
     with _TURN:
         collecting = pause_gc and gc.isenabled()
