@@ -21,6 +21,7 @@ class Backend:
     accuracy : of x, relative to 1 + |x|; an answer that is not shown to reach it is not used.
     options : its tolerances, passed on by qpsolvers.
     sparse : whether it needs sparse matrices.
+    halved : whether it reads the upper half of the Hessian, and is slow to cut off the other.
     regularisation : added to the diagonal of the Hessian, for solvers that need a definite one.
     starts : whether it accepts an initial guess.
     core : whether it is installed with the package; otherwise with the extra.
@@ -31,6 +32,7 @@ class Backend:
     accuracy: float
     options: Mapping[str, Any]
     sparse: bool = False
+    halved: bool = False
     regularisation: float = 0.0
     starts: bool = False
     core: bool = False
@@ -40,7 +42,7 @@ BACKENDS: Mapping[str, Backend] = MappingProxyType({backend.name: backend for ba
     Backend("proxqp", "proxsuite", 1e-6, {"eps_abs": 1e-9, "eps_rel": 0.0, "max_iter": 1000},
             starts=True, core=True),
     Backend("osqp", "osqp", 1e-5, {"eps_abs": 1e-7, "eps_rel": 1e-7, "max_iter": 20000},
-            sparse=True, starts=True, core=True),
+            sparse=True, halved=True, starts=True, core=True),
     Backend("quadprog", "quadprog", 1e-6, {}, regularisation=1e-9),
     Backend("daqp", "daqp", 1e-6, {"primal_tol": 1e-9}, regularisation=1e-9, starts=True),
     Backend("piqp", "piqp", 1e-6, {"eps_abs": 1e-9, "eps_rel": 0.0}),

@@ -17,6 +17,7 @@ from solvers.qp.refinement import Rows, split
 
 if TYPE_CHECKING:
     import qpsolvers
+    from scipy.sparse import csc_matrix
 
 _RANK, _SETTLED = 1e-8, 1e-7  # of `level_problem`: rank tolerance, and miss of a row that is kept
 _WARNINGS = Lock()  # their filters belong to the process: threads would restore each other's
@@ -38,11 +39,12 @@ class Program(NamedTuple):
         """Return the backend's y, zeros if it gave none, and whether the backend vouches for it."""
         import qpsolvers
 
+        program = self._replace(P=np.triu(self.P)) if backend.halved else self
         with _WARNINGS, warnings.catch_warnings():
             warnings.simplefilter("ignore")  # the backend's status says the same
             try:
                 solution = qpsolvers.solve_problem(
-                    self.problem(backend.sparse, backend.regularisation), solver=backend.name,
+                    program.problem(backend.sparse, backend.regularisation), solver=backend.name,
                     initvals=self.start if backend.starts else None, **backend.options)
             except Exception:  # backends raise any exception; each is a failure
                 return np.zeros(len(self.q)), False
@@ -57,11 +59,10 @@ class Program(NamedTuple):
         regularisation : added to the diagonal of P.
         """
         import qpsolvers
-        from scipy.sparse import csc_matrix
 
-        kind = csc_matrix if sparse else np.ascontiguousarray
+        kind = _sparse if sparse else np.ascontiguousarray
         up, low = np.isfinite(self.upper), np.isfinite(self.lower)
-        P = self.P + regularisation * np.eye(len(self.q))
+        P = self.P + regularisation * np.eye(len(self.q)) if regularisation else self.P
         rows: dict[str, object] = {}
         if len(self.A):
             rows["G"] = kind(np.vstack([self.A[up], -self.A[low]]))
@@ -71,13 +72,23 @@ class Program(NamedTuple):
         return qpsolvers.Problem(kind(P), self.q, **rows)
 
 
+def _sparse(M: Array) -> csc_matrix:
+    """Return `csc_matrix(M)`, in half its time."""
+    from scipy.sparse import csc_matrix
+
+    columns, rows = np.nonzero(M.T)
+    starts = np.zeros(M.shape[1] + 1, np.intc)
+    np.cumsum(np.count_nonzero(M, axis=0), out=starts[1:])
+    return csc_matrix((M[rows, columns], rows.astype(np.intc), starts), M.shape)
+
+
 def null_space_program(goal: Rows, limits: Rows, kept: Rows, lam: float, start: Array | None
                        ) -> Program:
     """Return the program with unknowns z and w (k,), the signed violation of each limit."""
     p, k = goal.A.shape[1], limits.lower.size
-    P = np.eye(p + k)
-    P[:p, :p] = goal.A.T @ goal.A + lam**2 * np.eye(p)
-    A = np.block([[limits.A, -np.eye(k)], [kept.A, np.zeros((kept.lower.size, k))]])
+    P, A = np.eye(p + k), np.zeros((k + kept.lower.size, p + k))
+    P[:p, :p] = goal.A.T @ goal.A + lam**2 * P[:p, :p]
+    A[:k, :p], A[:k, p:], A[k:, :p] = limits.A, -P[p:, p:], kept.A
     begin = None if start is None else np.concatenate([start, limits.excess(start)])
     return Program(P, np.concatenate([-goal.A.T @ goal.lower, np.zeros(k)]), A,
                    np.concatenate([limits.lower, kept.lower]),

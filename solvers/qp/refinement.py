@@ -45,6 +45,8 @@ class Rows(NamedTuple):
     def seen(self, N: Array, rank_tolerance: float) -> Rows:
         """Return the same rows for the unknown z of N z, with zeros for rows dependent on N."""
         A, sizes = self.A @ N, lengths(self.A)
+        if not sizes.size:
+            return Rows(A, self.lower, self.upper)
         A[lengths(A) <= rank_tolerance * sizes] = 0.0
         A[abs(A) <= ROUNDING * sizes[:, None]] = 0.0
         return Rows(A, self.lower, self.upper)
@@ -95,6 +97,8 @@ def split(M: Array, norms: Array, rank_tolerance: float) -> tuple[Array, Array]:
 
     norms : (k,) of the rows before any projection, relative to which M is judged.
     """
+    if not len(M):
+        return np.empty((M.shape[1], 0)), np.eye(M.shape[1])
     scaled = M / np.where(norms > 0.0, norms, 1.0)[:, None]
     _, s, Vt = np.linalg.svd(scaled, full_matrices=True)
     rank = int((s > rank_tolerance).sum())
@@ -241,9 +245,9 @@ def _moved_inside(z: Array, D: Array, rows: Rows) -> Array:
     return np.asarray(z + D @ (G.T @ u) * (off / (1.0 - g @ u)))
 
 
-def below_largest(*arrays: Array) -> bool:
-    """Whether all entries are finite and smaller than LARGEST."""
-    return all(bool((np.abs(array) < LARGEST).all()) for array in arrays)
+def below_largest(*arrays: Array, scale: float = 1.0) -> bool:
+    """Whether all entries are finite and smaller than LARGEST times `scale`."""
+    return all(bool((np.abs(array) < LARGEST * scale).all()) for array in arrays)
 
 
 def _non_negative(A: Array, b: Array) -> tuple[Array, float]:

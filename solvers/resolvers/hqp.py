@@ -83,12 +83,10 @@ def _in_range(h: Hierarchy) -> bool:
     """
     if not sound_rows(*h.rows[:3]) or not below_largest(h.A, h.reference):
         return False
-    with np.errstate(over="ignore"):
-        for A, lower, upper in h.levels():
-            scale = float(abs(A).max(initial=0.0))
-            finite = np.concatenate([lower[lower > -np.inf], upper[upper < np.inf]])
-            if scale > 0.0 and not below_largest(finite / scale):
-                return False
+    for A, lower, upper in h.levels():
+        scale, sides = float(abs(A).max(initial=0.0)), np.concatenate([lower, upper])
+        if scale > 0.0 and not below_largest(sides[abs(sides) < np.inf], scale=scale):
+            return False
     return True
 
 
@@ -146,9 +144,11 @@ class _Cascade:
         fixed[~equal] = self._advance(rows, equal, own, scale) != 0
         if (fixed != equal).any():
             own, free = self._split(rows.A[fixed])
-        self.F = np.vstack([self.F, (self.N @ own).T])
+        if self.settings.form == "slack":
+            self.F = np.vstack([self.F, (self.N @ own).T])
         self.N = self.N @ free
-        self.kept = self.kept.and_(rows.where(~fixed).normalised())
+        if not fixed.all():
+            self.kept = self.kept.and_(rows.where(~fixed).normalised())
 
     def _advance(self, rows: Rows, equal: Mask, own: Array, scale: float) -> Array:
         """Step to the minimum of a level; return the side on which each inequality is violated.
@@ -164,9 +164,6 @@ class _Cascade:
         z, broken = self._minimise(goal, limits, own, self._lambda(rows.A, equal, own, scale))
         self._step(z)
         return broken
-
-    def _seen(self, rows: Rows) -> Rows:
-        return rows.seen(self.N, self.settings.rank_tolerance)
 
     def _split(self, A: Array) -> tuple[Array, Array]:
         return split(A @ self.N, lengths(A), self.settings.rank_tolerance)
@@ -193,6 +190,8 @@ class _Cascade:
 
     def _movable(self) -> Rows:
         """Return the rows from above that a step along N can still move, as rows of that step."""
+        if not self.kept.lower.size:
+            return self.kept
         moved = lengths(self.kept.A @ self.N) > self.settings.rank_tolerance
         return self.kept.where(moved).from_(self.x)
 
@@ -204,33 +203,35 @@ class _Cascade:
         Returns z and the side on which each limit remains violated. Raises _StopError if no
         answer could be verified.
         """
-        kept, vouched = self._movable(), False
-        E, e = self._target(goal, own, lam, last)
+        s, kept, vouched = self.settings, self._movable(), False
+        level = goal, limits, kept
+        seen = goal_seen, limits_seen, kept_seen = (
+            goal.seen(self.N, s.rank_tolerance), limits.seen(self.N, s.rank_tolerance),
+            kept.seen(self.N, s.rank_tolerance))
+        E, e = self._target(goal, goal_seen, own, lam, last)
         for wider in _WIDER:
-            slack = wider * self.settings.slack
-            relaxed = Rows(kept.A, kept.lower - slack, kept.upper + slack)
-            z, found = self._ask(goal, limits, relaxed, lam, last)
+            z, found = self._ask(seen if s.form == "null-space" else level, wider, lam, last)
             vouched |= found
             if not kept.lower.size and not limits.lower.size:
                 return self._least_squares(z, E, e, own, lam), np.empty(0)
-            limits_seen, kept_seen = self._seen(limits), self._seen(kept)
             rows = np.vstack([E, limits_seen.sided().A, kept_seen.sided().A])
             visible = split(rows, lengths(rows), EXACT)[0]  # backends went 1e8 along the rest
             for start in (visible @ (visible.T @ z), np.zeros_like(z)):  # where kept rows hold
-                exact = refined(start, E, e, limits_seen, kept_seen,
-                                self.settings.rank_tolerance)
+                exact = refined(start, E, e, limits_seen, kept_seen, s.rank_tolerance)
                 if exact is not None:
                     return exact
         raise _StopError(Status.INACCURATE if vouched else Status.BACKEND_FAILURE)
 
-    def _target(self, goal: Rows, own: Array, lam: float, last: bool) -> tuple[Array, Array]:
+    def _target(self, goal: Rows, seen: Rows, own: Array, lam: float, last: bool
+                ) -> tuple[Array, Array]:
         """Return E and e: the goal and its damping are ||E z - e||^2."""
         N, p = self.N, self.N.shape[1]
         if last:
             return np.eye(p), N.T @ goal.lower
         if lam:
-            return np.vstack([goal.A @ N, lam * np.eye(p)]), np.pad(goal.lower, (0, p))
-        return self._seen(goal).A @ own @ own.T, goal.lower
+            return (np.vstack([goal.A @ N, lam * np.eye(p)]),
+                    np.concatenate([goal.lower, np.zeros(p)]))
+        return seen.A @ own @ own.T, goal.lower
 
     def _least_squares(self, z: Array, E: Array, e: Array, own: Array, lam: float) -> Array:
         """Return z if its gradient proves it accurate enough, else the exact least squares."""
@@ -244,9 +245,15 @@ class _Cascade:
             return np.asarray(own @ z)
         return least(E, e, lengths(E), self.settings.rank_tolerance)[0]
 
-    def _ask(self, goal: Rows, limits: Rows, kept: Rows, lam: float, last: bool
+    def _ask(self, level: tuple[Rows, Rows, Rows], wider: float, lam: float, last: bool
              ) -> tuple[Array, bool]:
-        """Return the z of the backend, and whether the backend vouches for it."""
+        """Return the z of the backend, and whether the backend vouches for it.
+
+        level : goal, limits and kept rows, of the step, or of z for the null-space form.
+        """
+        goal, limits, kept = level
+        slack = wider * self.settings.slack
+        kept = Rows(kept.A, kept.lower - slack, kept.upper + slack)
         start = None if self.starts is None else self.starts[len(self.steps)]
         self.programs += 1
         if self.settings.form == "slack":
@@ -255,7 +262,5 @@ class _Cascade:
             return self.N.T @ d[:self.h.n], found
         if start is not None:
             start = self.N.T @ start
-        program = null_space_program(self._seen(goal), self._seen(limits), self._seen(kept), lam,
-                                     start)
-        z, found = program.solve(self.backend)
+        z, found = null_space_program(goal, limits, kept, lam, start).solve(self.backend)
         return z[:self.N.shape[1]], found

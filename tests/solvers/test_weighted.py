@@ -96,6 +96,19 @@ def test_an_answer_that_cannot_be_shown_right_leaves_the_levels_above(vouched, s
     np.testing.assert_allclose(res.x, [2.0, 0.0], rtol=0.0, atol=3.0 * make("hqp").accuracy)
 
 
+@pytest.mark.parametrize("name", [name for name in backends.BACKENDS if backends.installed(name)])
+@pytest.mark.parametrize("rows", [0, 2])
+def test_what_a_backend_answers_is_near_the_optimum_before_it_is_refined(name, rows):
+    rng = np.random.default_rng(rows)
+    A, b, sides = rng.normal(size=(4, 3)), rng.normal(size=4), np.full(rows, 50.0)
+    kept = refinement.Rows(rng.normal(size=(rows, 3)), -sides, sides)
+    y, vouched = programs.null_space_program(
+        refinement.Rows(A, b, b), refinement.Rows.none(3), kept, 0.0, None
+    ).solve(backends.backend_of(name))
+    assert vouched
+    np.testing.assert_allclose(y, np.linalg.lstsq(A, b)[0], atol=1e-5)
+
+
 def test_a_backend_that_raises_is_a_status_and_the_level_of_limits_is_kept(monkeypatch):
     monkeypatch.setattr("qpsolvers.solve_problem", lambda *_, **__: 1 / 0)
     monkeypatch.setattr("solvers.qp.refinement.REFINEMENTS", 5)  # more do without a backend
