@@ -61,10 +61,10 @@ class Program(NamedTuple):
         import qpsolvers
 
         kind = _sparse if sparse else np.ascontiguousarray
-        up, low = np.isfinite(self.upper), np.isfinite(self.lower)
         P = self.P + regularisation * np.eye(len(self.q)) if regularisation else self.P
         rows: dict[str, object] = {}
         if len(self.A):
+            up, low = np.isfinite(self.upper), np.isfinite(self.lower)
             rows["G"] = kind(np.vstack([self.A[up], -self.A[low]]))
             rows["h"] = np.concatenate([self.upper[up], -self.lower[low]])
         if self.f.size:

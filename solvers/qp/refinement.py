@@ -39,6 +39,8 @@ class Rows(NamedTuple):
 
     def from_(self, x: Array) -> Rows:
         """Return the same rows for the unknown d of x + d."""
+        if not self.lower.size:
+            return self
         value = self.A @ x
         return Rows(self.A, self.lower - value, self.upper - value)
 
@@ -59,6 +61,8 @@ class Rows(NamedTuple):
 
     def where(self, chosen: NDArray[np.bool_]) -> Rows:
         """Return the rows chosen by a mask."""
+        if chosen.all():
+            return self
         return Rows(self.A[chosen], self.lower[chosen], self.upper[chosen])
 
     def sided(self) -> Rows:
