@@ -31,7 +31,7 @@ PIP        := env PYTHONWARNINGS=ignore $(BIN)/python -m pip install --quiet --n
               --disable-pip-version-check --progress-bar off --constraint constraints.txt
 
 .DELETE_ON_ERROR:
-.PHONY: demo test quick bench stress reproduce docs dist clean set-up kernels solvers-o robots-o
+.PHONY: demo test quick bench stress reproduce docs dist clean set-up kernels others-o robots-o solvers-o
 
 demo: kernels
 	@rm -rf runs/demo
@@ -86,10 +86,10 @@ set-up: kernels $(INSTALLED)
 
 # Kernels are compiled again when their sources have changed; without them each process compiles what
 # it calls, so that a failure stops nothing.
-kernels: solvers-o robots-o
+kernels: solvers-o others-o robots-o
 
-solvers-o: $(ARRAYS)
-	-@$(BIN)/python -m scenarios.ahead solvers
+solvers-o others-o: $(ARRAYS)
+	-@$(BIN)/python -m scenarios.ahead $(@:-o=)
 
 robots-o: $(SMALL)
 	-@$(BIN)/python -m scenarios.ahead robots

@@ -1,18 +1,19 @@
 """Compile kernels ahead: `python -m scenarios.ahead` writes the object files of the package.
 
 With each it writes LLVM code, from which other processors make their object files and `hierarchy
-library` the C library. With the name of a part it writes that one; `solvers` needs nothing but
-numba and scipy.
+library` the C library. With the name of a part it writes that one; `solvers` and `others` need
+nothing but numba and scipy.
 
 `calls.txt` says what Python calls. `python -m scenarios.ahead record` writes it anew, of what JOBS
 call: each kind of call of the documents, once.
 """
 
+import hashlib
 import os
 import re
 import sys
 import tempfile
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from contextlib import redirect_stderr, redirect_stdout
 from functools import partial
 from io import StringIO
@@ -26,8 +27,12 @@ from scenarios.results.pool import ended
 
 CALLS = Path(__file__).with_name("calls.txt")
 _OTHERS = CALLS.with_name("others.toml")
-# The first part of a name of a kernel decides which object file it is in.
-PARTS = {"solvers": ("solvers",), "robots": ("hierarchy", "scenarios")}
+# The object file of a kernel is the first with the beginning of its name. Those of "others" share
+# little with the rest: apart, two cores are busy until all is compiled, the longest first.
+PARTS = {
+    "others": ("solvers.adapters", "solvers.metric",
+               *map("solvers.kernels.".__add__, ("met.", "published", "reverse", "staircase"))),
+    "robots": ("hierarchy", "scenarios"), "solvers": ("solvers",)}
 # Together they have every kind of task, sensor and plant of the shipped scenarios.
 _SCENARIOS = ("crawl", "dual-arm", "ellipse", "ellipse-3d", "ellipse-danger-bounds", "ellipse-hqp",
               "ellipse-inertia", "ellipse-mass", "ellipse-nullspace", "ellipse-published",
@@ -40,21 +45,19 @@ _PYTHON = re.compile(r"^```python\n(.*?)^```", re.DOTALL | re.MULTILINE)
 
 def main() -> None:
     """Write the object files of the parts that are named, or all, unless they are current."""
-    from hierarchy.jit.caching import FOLDER
     from hierarchy.jit.exporting import ENVIRONMENT
 
     names = sys.argv[1:]
     if names == ["record"]:
         CALLS.write_text("".join(f"{call}\n" for call in _recorded()))
         names = []
-    begun, calls = monotonic(), CALLS.read_text().splitlines()
-    parts = [(FOLDER / f"{part}.o", [call for call in calls if call.startswith(PARTS[part])])
-             for part in names or PARTS if not is_current(part)]
-    for file, entries in parts:
-        _say(f"{file.name}: compiling {len(entries)} entries of kernels, once ...")
+    begun = monotonic()
+    parts = [part for part in names or list(PARTS)[::-1] if not is_current(part)]
+    for part in parts:
+        _say(f"{part}.o: compiling {len(_calls(part))} entries of kernels, once ...")
     os.environ.update(ENVIRONMENT)  # of the processes that compile
-    for (file, _), size in ended(compile_part, parts):
-        _say(f"{file.name}: {size / 1e6:.2f} MB after {monotonic() - begun:.0f} s")
+    for part, size in ended(compile_part, parts):
+        _say(f"{part}.o: {size / 1e6:.2f} MB after {monotonic() - begun:.0f} s")
 
 
 def is_current(part: str) -> bool:
@@ -63,7 +66,7 @@ def is_current(part: str) -> bool:
     from hierarchy.jit.caching import FOLDER
 
     file, functions = FOLDER / f"{part}.o", _functions(part)
-    return (exporting.is_current(file, _listed())
+    return (exporting.is_current(file, _digest(_calls(part)))
             and exporting.stored(file.with_suffix(".bc"), functions) is not None)
 
 
@@ -77,13 +80,14 @@ def record(job: str) -> list[str]:
     return sorted(asked)
 
 
-def compile_part(part: tuple[Path, Sequence[str]]) -> int:
+def compile_part(part: str) -> int:
     """Write one object file and return its size [B]."""
+    from hierarchy.jit.caching import FOLDER
     from hierarchy.jit.exporting import build
 
-    file, calls = part
-    build(file, _listed(), calls, lambda count: None if count % 20 else _say(
-        f"{file.stem}: {count} of {len(calls)}"), _functions(file.stem))
+    file, calls = FOLDER / f"{part}.o", _calls(part)
+    build(file, _digest(calls), calls, lambda count: None if count % 20 else _say(
+        f"{part}: {count} of {len(calls)}"), _functions(part))
     return file.stat().st_size
 
 
@@ -97,6 +101,12 @@ def _recorded() -> list[str]:
     return sorted(calls)
 
 
+def _calls(part: str) -> list[str]:
+    """Return the calls that are listed for a part."""
+    return [call for call in CALLS.read_text().splitlines() if part == next(
+        one for one, names in PARTS.items() if call.startswith(names))]
+
+
 def _functions(part: str) -> dict[str, Any]:
     """Return the functions of C that are compiled with a part."""
     from solvers.library.entries import FUNCTIONS
@@ -104,10 +114,8 @@ def _functions(part: str) -> dict[str, Any]:
     return FUNCTIONS if part == "solvers" else {}
 
 
-def _listed() -> str:
-    from hierarchy.jit.sources import digest_of
-
-    return digest_of(str(CALLS))
+def _digest(calls: list[str]) -> str:
+    return hashlib.sha256("\n".join(calls).encode()).hexdigest()
 
 
 def _say(what: str) -> None:
