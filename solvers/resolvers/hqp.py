@@ -236,13 +236,12 @@ class _Cascade:
     def _least_squares(self, z: Array, E: Array, e: Array, own: Array, lam: float) -> Array:
         """Return z if its gradient proves it accurate enough, else the exact least squares."""
         if lam:
-            own, smallest = np.eye(len(z)), lam
-        else:
-            smallest = float(np.linalg.svd(E @ own, compute_uv=False).min(initial=np.inf))
-        z = own.T @ z  # the level cannot see the rest
+            own = np.eye(len(z))
+        M, y = E @ own, own.T @ z  # the level cannot see the rest of z
+        smallest = lam or float(np.linalg.svd(M, compute_uv=False).min(initial=np.inf))
         allowed = float(_SHARE * self.backend.accuracy * (1.0 + norm(self.x)))
-        if norm(own.T @ (E.T @ e) - own.T @ (E.T @ (E @ (own @ z)))) <= allowed * smallest**2:
-            return np.asarray(own @ z)
+        if norm(M.T @ (e - M @ y)) <= allowed * smallest**2:
+            return np.asarray(own @ y)
         return least(E, e, lengths(E), self.settings.rank_tolerance)[0]
 
     def _ask(self, level: tuple[Rows, Rows, Rows], wider: float, lam: float, last: bool
