@@ -22,6 +22,7 @@ class Backend:
     options : its tolerances, passed on by qpsolvers.
     sparse : whether it needs sparse matrices.
     halved : whether it reads the upper half of the Hessian, and is slow to cut off the other.
+    scaled : whether it gets unknowns of order one, as its tolerances are not relative to them.
     regularisation : added to the diagonal of the Hessian, for solvers that need a definite one.
     starts : whether it accepts an initial guess.
     core : whether it is installed with the package; otherwise with the extra.
@@ -33,6 +34,7 @@ class Backend:
     options: Mapping[str, Any]
     sparse: bool = False
     halved: bool = False
+    scaled: bool = True
     regularisation: float = 0.0
     starts: bool = False
     core: bool = False
@@ -42,7 +44,7 @@ BACKENDS: Mapping[str, Backend] = MappingProxyType({backend.name: backend for ba
     Backend("proxqp", "proxsuite", 1e-6, {"eps_abs": 1e-9, "eps_rel": 0.0, "max_iter": 1000},
             starts=True, core=True),
     Backend("osqp", "osqp", 1e-5, {"eps_abs": 1e-7, "eps_rel": 1e-7, "max_iter": 20000},
-            sparse=True, halved=True, starts=True, core=True),
+            sparse=True, halved=True, scaled=False, starts=True, core=True),
     Backend("quadprog", "quadprog", 1e-6, {}, regularisation=1e-9),
     Backend("daqp", "daqp", 1e-6, {"primal_tol": 1e-9}, regularisation=1e-9, starts=True),
     Backend("piqp", "piqp", 1e-6, {"eps_abs": 1e-9, "eps_rel": 0.0}),
@@ -70,8 +72,8 @@ def backend_of(name: str) -> Backend:
 @cache
 def installed(name: str) -> bool:
     """Whether a backend can be imported."""
-    if name == "osqp":  # it otherwise looks for MKL and CUDA builds on disk at every program
-        os.environ.setdefault("OSQP_ALGEBRA_BACKEND", "builtin")
+    # osqp, which qpsolvers imports, otherwise looks for builds with MKL and CUDA at every program.
+    os.environ.setdefault("OSQP_ALGEBRA_BACKEND", "builtin")
     try:
         import_module(BACKENDS[name].module)
     except ImportError:

@@ -7,6 +7,7 @@ from threading import Lock
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
+from numpy.linalg import norm
 from numpy.typing import ArrayLike
 
 from hierarchy.errors import HierarchyError, expect, refuse, whole
@@ -35,22 +36,39 @@ class Program(NamedTuple):
     f: Array
     start: Array | None = None
 
-    def solve(self, backend: Backend) -> tuple[Array, bool]:
-        """Return the backend's y, zeros if it gave none, and whether the backend vouches for it."""
+    def solve(self, backend: Backend, unit: float = 1.0) -> tuple[Array, bool]:
+        """Return the backend's y, zeros if it gave none, and whether the backend vouches for it.
+
+        unit : multiple of the size of y in which y is passed to a backend that is `scaled`.
+        """
         import qpsolvers
 
-        program = self._replace(P=np.triu(self.P)) if backend.halved else self
+        program, size = self._scaled(unit if backend.scaled else 0.0)
+        if backend.halved:
+            program = program._replace(P=np.triu(program.P))
         with _WARNINGS, warnings.catch_warnings():
             warnings.simplefilter("ignore")  # the backend's status says the same
             try:
                 solution = qpsolvers.solve_problem(
                     program.problem(backend.sparse, backend.regularisation), solver=backend.name,
-                    initvals=self.start if backend.starts else None, **backend.options)
+                    initvals=program.start if backend.starts else None, **backend.options)
             except Exception:  # backends raise any exception; each is a failure
                 return np.zeros(len(self.q)), False
         if solution.x is None or not np.isfinite(solution.x).all():
             return np.zeros(len(self.q)), False
-        return np.asarray(solution.x), bool(solution.found)
+        return size * solution.x, bool(solution.found)
+
+    def _scaled(self, unit: float) -> tuple[Program, float]:
+        """Return the program with a Hessian and an answer of order one, and what that counts.
+
+        Backends took others for infeasible, which none is.
+        """
+        weight = float(self.P.diagonal().max(initial=0.0)) or 1.0
+        size = unit * max(float(norm(self.q)) / weight, float(
+            abs(np.clip(0.0, self.lower, self.upper)).max(initial=0.0))) or 1.0
+        start = None if self.start is None else self.start / size
+        return Program(self.P / weight, self.q / (weight * size), self.A, self.lower / size,
+                       self.upper / size, self.F, self.f / size, start), size
 
     def problem(self, sparse: bool = False, regularisation: float = 0.0) -> qpsolvers.Problem:
         """Return the `qpsolvers.Problem` P, q, G, h, F, f, with G y <= h for both sides.

@@ -257,9 +257,9 @@ class _Cascade:
         self.programs += 1
         if self.settings.form == "slack":
             program = slack_program(goal, limits, kept, self.F, lam, last=last, start=start)
-            d, found = program.solve(self.backend)
+            d, found = program.solve(self.backend, wider)
             return self.N.T @ d[:self.h.n], found
         if start is not None:
             start = self.N.T @ start
-        z, found = null_space_program(goal, limits, kept, lam, start).solve(self.backend)
+        z, found = null_space_program(goal, limits, kept, lam, start).solve(self.backend, wider)
         return z[:self.N.shape[1]], found

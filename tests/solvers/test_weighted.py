@@ -1,5 +1,6 @@
 """Priorities as weights, merged levels with a memory, and the cascade of quadratic programs."""
 
+import subprocess
 import sys
 import warnings
 from threading import Event, Thread
@@ -107,6 +108,26 @@ def test_what_a_backend_answers_is_near_the_optimum_before_it_is_refined(name, r
     ).solve(backends.backend_of(name))
     assert vouched
     np.testing.assert_allclose(y, np.linalg.lstsq(A, b)[0], atol=1e-5)
+
+
+def test_a_program_of_small_weights_and_wide_sides_is_not_taken_for_infeasible():
+    """As of forces that may be 1e4 N, of which a level that is little sees a part."""
+    rng = np.random.default_rng(4)
+    A, wide = rng.normal(size=(30, 12)), np.full(30, 1e4)
+    goal = refinement.Rows(1e-2 * rng.normal(size=(3, 12)), *[np.array([40.0, -300.0, 20.0])] * 2)
+    y, vouched = programs.null_space_program(
+        goal, refinement.Rows.none(12), refinement.Rows(A, -wide, 1e-2 * wide), 0.0, None
+    ).solve(backends.backend_of("proxqp"))
+    assert vouched
+    assert (A @ y <= 1e2 + 1e-3).all()
+
+
+def test_osqp_does_not_look_for_its_builds_at_each_program_whichever_backend_came_first():
+    code = ("import numpy as np, solvers, hierarchy\n"
+            "h = hierarchy.Hierarchy.from_levels([(np.eye(2), [1.0, 2.0])])\n"
+            "solvers.make('hqp').solve(h)\n"
+            "import osqp.interface\nassert osqp.interface.OSQP_ALGEBRA_BACKEND == 'builtin'")
+    subprocess.run([sys.executable, "-c", code], check=True)
 
 
 def test_a_backend_that_raises_is_a_status_and_the_level_of_limits_is_kept(monkeypatch):
