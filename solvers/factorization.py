@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import asdict
 from numbers import Integral
 from typing import NamedTuple, final
@@ -173,6 +173,7 @@ class Factorization:
 
         Raises HierarchyError unless each level occurs once.
         """
+        expect("reorder: order", order, Iterable, "give a list of names or indices")
         places = [self._place(level) for level in order]
         if sorted(places) != list(range(len(self._levels))):
             raise HierarchyError(f"reorder needs each of {list(self.names)} once, got "
@@ -193,7 +194,7 @@ class Factorization:
         place = len(self._levels) if at is None else at
         level_names([*self.names, level], len(self._levels) + 1)
         if not isinstance(place, Integral) or not 0 <= place <= len(self._levels):
-            raise HierarchyError(f"{level}: index {at} is outside 0 .. {len(self._levels)}")
+            raise HierarchyError(f"{level}: index {at!r} is outside 0 .. {len(self._levels)}")
         block = self._checked(level, A)
         if len(self._Q) > 2 * self.m + _FEWEST:  # most of it of deleted levels
             self._factor_afresh([(held.name, held.A) for held in self._levels])
@@ -238,7 +239,7 @@ class Factorization:
             check_name("level", level, self.names)
             return self.names.index(level)
         if not isinstance(level, Integral) or not 0 <= level < len(self._levels):
-            raise HierarchyError(f"index {level} is outside 0 .. {len(self._levels) - 1}")
+            raise HierarchyError(f"index {level!r} is outside 0 .. {len(self._levels) - 1}")
         return level
 
     def _projected(self, A: Array) -> Array:

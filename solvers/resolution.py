@@ -81,8 +81,8 @@ class SaturatedResolution(Resolution):
 
     Attributes in addition to those of `Resolution`; n unknowns, L levels
     ----------
-    saturated : (n,) int8, +1 for an unknown at its upper bound, -1 at its lower bound, 2 where the
-        two bounds are equal, 0 where it is free.
+    saturated : (n,) int8, +1 for an unknown that its upper bound holds, -1 its lower bound, 2 where
+        the two are equal, 0 for others, even one that lies at a bound and would stay there.
     scaling : (L,) share of its target that each level reaches, 0 to 1; 1 for bounds that do not
         contradict each other. Each resolver documents how it computes the share.
     """
@@ -97,7 +97,7 @@ class SaturatedResolution(Resolution):
 
     @property
     def saturated(self) -> NDArray[np.int8]:
-        """Which unknowns are at a bound: (n,)."""
+        """Which unknowns a bound holds: (n,)."""
         return self._record[:len(self.x)].astype(np.int8)
 
     @property

@@ -14,19 +14,20 @@ using Members = std::map<std::string, std::string>;  // name -> bytes
 
 template <class T> T number(const std::string& bytes, size_t at) {
   T value;
-  if (at + sizeof(T) > bytes.size()) throw std::runtime_error("the file ends too early");
+  if (at + sizeof(T) > bytes.size()) throw std::runtime_error("ends too early");
   std::memcpy(&value, bytes.data() + at, sizeof(T));  // both are little-endian
   return value;
 }
 
 Members members(const char* path) {
   std::ifstream file(path, std::ios::binary);
+  if (!file) throw std::runtime_error("cannot be opened");
   const std::string zip{std::istreambuf_iterator<char>(file), {}};
   Members found;
   for (size_t at = 0; at + 30 < zip.size() && number<uint32_t>(zip, at) == 0x04034b50;) {
     const size_t size = number<uint32_t>(zip, at + 18), name = number<uint16_t>(zip, at + 26);
     const size_t begin = at + 30 + name + number<uint16_t>(zip, at + 28);
-    if (number<uint16_t>(zip, at + 8)) throw std::runtime_error("a member is compressed");
+    if (number<uint16_t>(zip, at + 8)) throw std::runtime_error("has a compressed member");
     found[zip.substr(at + 30, name)] = zip.substr(begin, size);
     at = begin + size;
   }
@@ -35,15 +36,17 @@ Members members(const char* path) {
 
 // The numbers of an array; T is double or int64_t, as docs/problem-files.md says.
 template <class T> std::vector<T> array(const Members& all, const std::string& name) {
-  const std::string& npy = all.at(name + ".npy");
+  const auto found = all.find(name + ".npy");
+  if (found == all.end()) throw std::runtime_error("has no array " + name);
+  const std::string& npy = found->second;
   const size_t begin = 10 + number<uint16_t>(npy, 8);  // version 1.0 of the format of numpy
   std::vector<T> values((npy.size() - begin) / sizeof(T));
   std::memcpy(values.data(), npy.data() + begin, values.size() * sizeof(T));
   return values;
 }
 
-int main(int, char** argv) {
-  const Members all = members(argv[1]);
+void print(const char* path) {
+  const Members all = members(path);
   const auto n = array<int64_t>(all, "n"), levels = array<int64_t>(all, "levels");
   const auto sizes = array<int64_t>(all, "sizes");
   const auto A = array<double>(all, "A");  // lower, upper, reference, x, ... likewise
@@ -56,4 +59,13 @@ int main(int, char** argv) {
     std::printf("%zu: n %d, rows %zu, sum of A %.17g\n", p, int(n[p]), m, sum);
     entry += m * n[p], row += m;
   }
+}
+
+int main(int argc, char** argv) try {
+  if (argc != 2) throw std::runtime_error("give one FILE.npz");
+  print(argv[1]);
+} catch (const std::exception& error) {
+  std::fprintf(stderr, "read_problems%s%s: %s\n", argc == 2 ? ": " : "", argc == 2 ? argv[1] : "",
+               error.what());
+  return 2;
 }

@@ -76,6 +76,7 @@ class Batch:
         Raises HierarchyError: no hierarchies, one with other sizes or unknowns than the first, or
         one with a metric or levels that give.
         """
+        expect("Batch.of: hierarchies", hierarchies, Iterable, "give a list of them")
         hierarchies = list(hierarchies)
         if not hierarchies:
             raise HierarchyError("a batch of no hierarchies has no shape; pass arrays instead")

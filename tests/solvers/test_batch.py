@@ -99,6 +99,7 @@ def arrays(**wrong):
     (lambda: arrays(sizes=[2, 2]), "sizes sum to 4"), (lambda: arrays(sizes=[1.5, 1.5]), "whole"),
     (lambda: Batch.of([Hierarchy.from_levels([(np.eye(3)[:k], np.ones(k))]) for k in (2, 1)]),
      "problem 1"), (lambda: Batch.of([]), "no hierarchies"),
+    (lambda: Batch.of(None), "Batch.of: hierarchies: expected an Iterable, got NoneType None"),
     (lambda: Batch.of([1]), "problem 0: expected a Hierarchy"),
     (lambda: Batch.of([Hierarchy.from_levels([([[1.0, 0.3]], [1.0])], metric=np.eye(2))]),
      "problem 0 has a metric"),

@@ -137,6 +137,8 @@ def test_rows_whose_squares_overflow_are_a_status_until_they_are_deleted():
     (lambda f: f.insert("foot", [[1, 2, 3], [0, np.nan, 0]]), "foot, row 1: A[1, 1] is nan"),
     (lambda f: f.insert("foot", np.eye(3), 3), "foot: index 3 is outside 0 .. 2"),
     (lambda f: f.reorder(["hand", "hand"]), "reorder needs each of ['hand', 'elbow'] once"),
+    (lambda f: f.reorder(None), "reorder: order: expected an Iterable, got NoneType None"),
+    (lambda f: f.insert("new", np.eye(4), "0"), "new: index '0' is outside 0 .. 2"),
     (lambda f: f.solve({"hand": [1.0, 2.0]}), "elbow: no target given"),
     (lambda f: f.solve([[1.0, 2.0]]), "1 targets for 2 levels"),
     (lambda f: f.solve(np.ones((3, 1))), "targets have shape (3, 1), expected (3,)"),

@@ -60,6 +60,14 @@ def test_the_reader_in_cpp_finds_the_same_numbers(collection, file, tmp_path):
         head, _, total = line.rpartition(" ")
         assert head == f"{p}: n {h.n}, rows {h.m}, sum of A"
         assert float(total) == pytest.approx(h.A.sum(), abs=1e-12)
+    other = tmp_path / "other.npz"
+    np.savez(other, levels=np.ones(1))
+    missing = tmp_path / "missing.npz"
+    for arguments, why in (([], ": give one FILE.npz"),
+                           ([missing], f": {missing}: cannot be opened"),
+                           ([other], f": {other}: has no array n")):
+        refused = subprocess.run([program, *arguments], text=True, capture_output=True)
+        assert (refused.returncode, refused.stderr) == (2, f"read_problems{why}\n")
 
 
 def rewritten(path, compression=zipfile.ZIP_STORED, **content):
