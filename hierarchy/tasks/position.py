@@ -75,7 +75,7 @@ class Along(Written):
         expect(f"task {self.name!r}: task", self.task, Position, "give a position task")
         try:
             D = np.array(self.directions, dtype=float)
-        except (TypeError, ValueError):
+        except (TypeError, ValueError, OverflowError):
             D = np.empty(0)
         self.refuse(D.ndim != 2 or D.shape[1:] != (3,) or not np.allclose(D @ D.T, np.eye(len(D))),
                     f"directions {self.directions!r} are not of length one and orthogonal, (m, 3)")

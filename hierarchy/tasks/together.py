@@ -6,7 +6,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from hierarchy.contacts import Contacts
-from hierarchy.errors import expect_each
+from hierarchy.errors import expect, expect_each
 from hierarchy.problem import Array
 from hierarchy.records import set_frozen
 from hierarchy.robot import Robot
@@ -111,6 +111,7 @@ class TangentCone(NamedRows, Written):
     kind: Kind = field(init=False, repr=False, compare=False, default="inequality")
 
     def __post_init__(self) -> None:
+        expect("set-based task", self.task, Task, "see hierarchy.tasks")
         self.task.refuse(self.task.kind != "inequality", "a set-based task has inequalities, got "
                          f"kind = {self.task.kind!r}")
         set_frozen(self, name=self.task.name)

@@ -14,7 +14,7 @@ from standing import CONTACTS, feet, opening
 from standing import ROBOT as HUMANOID
 
 from hierarchy import Hierarchy, Robot, Stack, State, Task, tasks
-from hierarchy.activation import Activation
+from hierarchy.activation import Activation, activation
 from hierarchy.avoidance import (
     Barrier,
     Capsule,
@@ -26,6 +26,7 @@ from hierarchy.avoidance import (
     Repulsion,
     SurveillanceAreas,
     measure_pairs,
+    pairs_of_chain,
 )
 from hierarchy.contacts import Contact, Contacts, corners
 from hierarchy.gate import check_rotation
@@ -34,7 +35,9 @@ from hierarchy.loop import Loop
 from hierarchy.measured import Measured
 from hierarchy.paths import Blended, Jittered, Shifted, Still, circle, read_bvh
 from hierarchy.robot import Frame
+from hierarchy.tasks.joints.coupling import FollowedJoints
 from hierarchy.tasks.joints.joint_limits import StepLimits
+from hierarchy.tasks.together import TangentCone
 from hierarchy.words import some
 
 NAN, INF = float("nan"), float("inf")
@@ -365,6 +368,22 @@ def limits(**settings):
     (grown, "task 'along': it has 2 rows, and arrays of 1 were made; make another"),
     (lambda: StepLimits(ROBOT, 0.01, 0.0), "gain [1/s] = 0: expected a number > 0"),
     (lambda: Obstacles([Obstacle("point", (0, 0, 0))]).shift(0, (NAN, 0, 0)), "shift: offset [m]"),
+    *((lambda h=h: Obstacles([Obstacle("point", (0, 0, 0))]).shift(h, (0, 0, 1)),
+       f"shift: h = {h!r}: expected a whole number from 0 to 0") for h in (-1, 1, None)),
+    (lambda: Pairs(-1, 2), "pairs: points = -1: expected a whole number from 0 on"),
+    (lambda: measure_pairs(None, B, Obstacles()), "measure_pairs: pairs: expected a Pairs, got No"),
+    (lambda: measure_pairs(Pairs(1, 0), B, []), "obstacles: expected an Obstacles, got list []"),
+    (lambda: pairs_of_chain(3), "capsules: expected a Sequence, got int 3"),
+    *((lambda width=width: activation(B, width), f"activation: buffer = {width}: expected")
+      for width in (0, -1, NAN)),
+    (lambda: activation("x", 0.1), "activation: error is not an array of numbers: str 'x'"),
+    (lambda: Activation(STATE, "x", {}), "activation: tasks[0]: expected a Task, got str 'x'"),
+    (lambda: Activation(STATE, [HAND], [0.1]), "buffers: expected a Mapping, got list [0.1]"),
+    (lambda: Activation(STATE, [HAND], {"positon": 0.1}), "did you mean 'position'"),
+    (lambda: TangentCone("x"), "set-based task: expected a Task, got str 'x'"),
+    (lambda: FollowedJoints(ROBOT, ()), "task 'couplings': no joints are coupled"),
+    (lambda: FollowedJoints(ROBOT, ["x"]), "coupled[0]: expected a Coupled, got str 'x'"),
+    (lambda: tasks.Along(HAND, 10**400), "are not of length one and orthogonal"),
     (lambda: Robot.load("nowhere.SDF"), "does not exist"),
     (lambda: Robot.load("/"), "is a folder")])
 def test_a_wrong_value_is_refused_and_named(make, said):
