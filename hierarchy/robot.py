@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
+from os import PathLike
 from pathlib import Path
 from typing import Any, get_args
 
@@ -16,6 +17,7 @@ from hierarchy.avoidance.body import ControlPoint
 from hierarchy.errors import (
     RobotError,
     UnknownNameError,
+    brief,
     check_name,
     expect,
     expect_each,
@@ -227,6 +229,8 @@ class Robot:
         may download files. `locked` and `root` are those of `from_file`. Raises RobotError and
         UnknownNameError.
         """
+        refuse(not isinstance(model, str | PathLike), "Robot.load: model: expected a name or a "
+               f"file, got {brief(model)}", RobotError)
         model = str(model)
         refuse(base is not None and not is_one_of(base, get_args(Base)), f"robot {model!r}: base "
                f"must be one of {get_args(Base)}, got {base!r}", RobotError)

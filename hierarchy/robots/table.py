@@ -1,10 +1,14 @@
 """Robots as tables of numbers: a serial arm by its Denavit-Hartenberg parameters, or any tree."""
 
 from dataclasses import dataclass
-from typing import Literal
+from typing import Annotated, Literal
+
+from hierarchy.errors import finite_numbers, refuse
+from hierarchy.records import NotNegative, check_fields
 
 Vector = tuple[float, float, float]
 Base = Literal["fixed", "floating"]
+Numbers = Annotated[tuple[float, ...], finite_numbers]
 
 
 @dataclass(frozen=True)
@@ -14,19 +18,25 @@ class DHTable:
     One entry per joint: a, d [m], alpha [deg]; position limits +-`range` [deg]; `velocity` [rad/s];
     `effort` limits [N m]; `mass` [kg] of the link that the joint moves. Each link is a
     uniform rod of radius `radius` [m] between its joint and the next. `control_points` are (joint,
-    offset (3,) [m] in the joint's frame).
+    offset (3,) [m] in the joint's frame). Raises HierarchyError for entries that do not fit.
     """
 
     name: str
-    a: tuple[float, ...]
-    d: tuple[float, ...]
-    alpha: tuple[float, ...]
-    range: tuple[float, ...]
-    velocity: tuple[float, ...]
-    effort: tuple[float, ...]
-    mass: tuple[float, ...]
-    radius: float
+    a: Numbers
+    d: Numbers
+    alpha: Numbers
+    range: Numbers
+    velocity: Numbers
+    effort: Numbers
+    mass: Numbers
+    radius: NotNegative
     control_points: tuple[tuple[str, Vector], ...]
+
+    def __post_init__(self) -> None:
+        check_fields(self, f"table {self.name!r}")
+        for name in ("a", "alpha", "range", "velocity", "effort", "mass"):
+            refuse(len(getattr(self, name)) != len(self.d), f"table {self.name!r}: {name} has "
+                   f"{len(getattr(self, name))} entries, and d {len(self.d)}, one for each joint")
 
 
 @dataclass(frozen=True)

@@ -1,6 +1,6 @@
 """Wrong values given to robots, states, paths, tasks and stacks: each with what it says."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 from threading import Event
@@ -35,6 +35,7 @@ from hierarchy.loop import Loop
 from hierarchy.measured import Measured
 from hierarchy.paths import Blended, Jittered, Shifted, Still, circle, read_bvh
 from hierarchy.robot import Frame
+from hierarchy.robots import TABLES
 from hierarchy.tasks.joints.coupling import FollowedJoints
 from hierarchy.tasks.joints.joint_limits import StepLimits
 from hierarchy.tasks.together import TangentCone
@@ -370,6 +371,12 @@ def limits(**settings):
     (lambda: Obstacles([Obstacle("point", (0, 0, 0))]).shift(0, (NAN, 0, 0)), "shift: offset [m]"),
     *((lambda h=h: Obstacles([Obstacle("point", (0, 0, 0))]).shift(h, (0, 0, 1)),
        f"shift: h = {h!r}: expected a whole number from 0 to 0") for h in (-1, 1, None)),
+    *((lambda t=t: THERE(t), f"path: t [s] = {t!r}: expected a finite number")
+      for t in (NAN, INF, None)),
+    (lambda: Robot.load(TABLES["kuka_lwr"]), "model: expected a name or a file, got DHTable"),
+    (lambda: Robot.load("a." * 5000), "unknown robot 'a.a."),
+    (lambda: replace(TABLES["kuka_lwr"], a=(0.0,)), "'kuka_lwr': a has 1 entries, and d 7, one"),
+    (lambda: replace(TABLES["kuka_lwr"], mass=(NAN,) * 7), "mass: expected finite numbers, got"),
     (lambda: Pairs(-1, 2), "pairs: points = -1: expected a whole number from 0 on"),
     (lambda: measure_pairs(None, B, Obstacles()), "measure_pairs: pairs: expected a Pairs, got No"),
     (lambda: measure_pairs(Pairs(1, 0), B, []), "obstacles: expected an Obstacles, got list []"),
