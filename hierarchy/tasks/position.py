@@ -98,6 +98,10 @@ class Along(Written):
         """Velocity of the path along the directions (m,) [m/s]."""
         return np.asarray(self.directions) @ self.task.desired_velocity(state)
 
+    def desired_acceleration(self, state: State) -> Array:
+        """Acceleration of the path along the directions (m,) [m/s^2]."""
+        return np.asarray(self.directions) @ self.task.desired_acceleration(state)
+
     def writer(self, state: State, level: Level, rows: Rows) -> Writer:
         """See `Task.writer`."""
         three, D = Rows.empty(3, rows.A.shape[1]), np.asarray(self.directions, dtype=float)

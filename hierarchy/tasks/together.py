@@ -81,6 +81,10 @@ class Together(NamedRows, Written):
         """Those of the tasks (m,), which `solve_ik` with `until` leaves out of the rows."""
         return np.hstack([task.desired_velocity(state) for task in self.tasks])
 
+    def desired_acceleration(self, state: State) -> Array:
+        """Those of the tasks (m,)."""
+        return np.hstack([task.desired_acceleration(state) for task in self.tasks])
+
     def writer(self, state: State, level: Level, rows: Rows) -> Writer:
         """See `Task.writer`."""
         parts = rows.split([task.dimension for task in self.tasks])
