@@ -35,7 +35,7 @@ from hierarchy.loop import Loop
 from hierarchy.measured import Measured
 from hierarchy.paths import Blended, Jittered, Shifted, Still, circle, read_bvh
 from hierarchy.robot import Frame
-from hierarchy.robots import TABLES
+from hierarchy.robots import TABLES, Link, TreeFrame, TreeTable
 from hierarchy.tasks.joints.coupling import FollowedJoints
 from hierarchy.tasks.joints.joint_limits import StepLimits
 from hierarchy.tasks.together import TangentCone
@@ -376,7 +376,20 @@ def limits(**settings):
     (lambda: Robot.load(TABLES["kuka_lwr"]), "model: expected a name or a file, got DHTable"),
     (lambda: Robot.load("a." * 5000), "unknown robot 'a.a."),
     (lambda: replace(TABLES["kuka_lwr"], a=(0.0,)), "'kuka_lwr': a has 1 entries, and d 7, one"),
+    (lambda: replace(TABLES["kuka_lwr"], effort=(-1.0,) * 7), "effort[0] = -1: expected a number"),
     (lambda: replace(TABLES["kuka_lwr"], mass=(NAN,) * 7), "mass: expected finite numbers, got"),
+    *((lambda kind=kind, wrong=wrong: kind(**wrong), said) for kind, wrong, said in (
+        (Link, {"mass": -1.0}, "link: mass = -1: expected a finite number from 0 on"),
+        (Link, {"end": None}, "link: end: expected 3 finite numbers, got NoneType None"),
+        (TreeFrame, {"name": "f", "joint": "", "offset": (0, 0, 0), "z_axis": (0, 0, 0)},
+         "frame 'f': z_axis: tuple (0, 0, 0) is no direction"),
+        (TreeTable, {"name": "t", "joints": ("a",), "frames": (), "end_effector": "a"},
+         "table 't': joints[0]: expected a TreeJoint, got str 'a'"))),
+    *((lambda wrong=wrong: replace(TABLES["quadruped"].joints[0], name="j", **wrong), said)
+      for wrong, said in (({"axis": "w"}, "joint 'j': axis = 'w': expected one of 'x', 'y', 'z'"),
+                          ({"range": (1, -1)}, "range: expected (lower, upper), got tuple (1, -1)"),
+                          ({"velocity": NAN}, "joint 'j': velocity = nan: expected a number"),
+                          ({"link": None}, "'j': link: expected a Link, got NoneType None"))),
     (lambda: Pairs(-1, 2), "pairs: points = -1: expected a whole number from 0 on"),
     (lambda: measure_pairs(None, B, Obstacles()), "measure_pairs: pairs: expected a Pairs, got No"),
     (lambda: measure_pairs(Pairs(1, 0), B, []), "obstacles: expected an Obstacles, got list []"),
