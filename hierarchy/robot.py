@@ -17,6 +17,7 @@ from hierarchy.avoidance.body import ControlPoint
 from hierarchy.errors import (
     RobotError,
     UnknownNameError,
+    as_float,
     brief,
     check_name,
     expect,
@@ -320,9 +321,9 @@ class Robot:
         refuse(self.base != "floating", f"robot {self.name!r}: its base is fixed and has no speed",
                RobotError)
         for what, speed in (("linear", linear), ("angular", angular)):
-            refuse(not isinstance(speed, int | float) or not speed > 0.0, f"robot {self.name!r}: "
+            refuse(not as_float(speed) > 0.0, f"robot {self.name!r}: "
                    f"{what} speed of the base = {speed}, expected a number > 0", RobotError)
-        self.velocity_limit[:6] = np.repeat([linear, angular], 3)
+        self.velocity_limit[:6] = np.repeat([as_float(linear), as_float(angular)], 3)
 
     def frame(self, name: str, what: str = "frame") -> Frame:
         """Find the frame called `name`, which an error calls `what`.

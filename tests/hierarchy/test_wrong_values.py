@@ -13,7 +13,7 @@ from scene import FRAME, ROBOT, SENSOR, state_at
 from standing import CONTACTS, feet, opening
 from standing import ROBOT as HUMANOID
 
-from hierarchy import Hierarchy, Robot, Stack, State, Task, tasks
+from hierarchy import Hierarchy, Robot, Stack, State, Task, plugins, tasks
 from hierarchy.activation import Activation, activation
 from hierarchy.avoidance import (
     Barrier,
@@ -390,6 +390,15 @@ def limits(**settings):
                           ({"range": (1, -1)}, "range: expected (lower, upper), got tuple (1, -1)"),
                           ({"velocity": NAN}, "joint 'j': velocity = nan: expected a number"),
                           ({"link": None}, "'j': link: expected a Link, got NoneType None"))),
+    *((lambda ask=ask: ask(LIMITS), said) for ask, said in (
+        (lambda task: task.box(None, "velocity"), "'joint limits': state: expected a State, got"),
+        (lambda task: task.clamp(3, "velocity", A[0]), "'joint limits': state: expected a State"),
+        (lambda task: task.rows("x"), "'joint limits': state: expected a State, got str 'x'"),
+        (lambda task: task.box(STATE, "speed"), "level = 'speed': expected one of 'velocity', 'ac"),
+        (lambda task: task.clamp(STATE, "speed", A[0]), "level = 'speed': expected one of"),
+        (lambda task: task.clamp(STATE, "velocity", "x"), "x is not an array of numbers: str 'x'"),
+        (lambda task: task.clamp(STATE, "velocity", None), "and a command of 1 for 7 joints"))),
+    (lambda: plugins.known("task"), "unknown group 'task'; did you mean 'tasks'?"),
     (lambda: Pairs(-1, 2), "pairs: points = -1: expected a whole number from 0 on"),
     (lambda: measure_pairs(None, B, Obstacles()), "measure_pairs: pairs: expected a Pairs, got No"),
     (lambda: measure_pairs(Pairs(1, 0), B, []), "obstacles: expected an Obstacles, got list []"),

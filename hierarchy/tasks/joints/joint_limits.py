@@ -110,7 +110,7 @@ class JointLimits(JointRows):
         first, positions, rates = self.first, self._positions(state), self._rates(state, level)
         if first == 0:
             return self.limits.clamp(positions, rates, level, x)
-        command = np.array(x, dtype=float)
+        command = np.atleast_1d(array_of(f"task {self.name!r}: x", x))
         command[:first][~np.isfinite(command[:first])] = 0.0
         command[first:] = self.limits.clamp(positions, rates, level, command[first:])
         return command
