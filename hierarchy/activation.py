@@ -13,7 +13,8 @@ from typing import final
 import numpy as np
 from numpy.typing import ArrayLike
 
-from hierarchy.errors import positive
+from hierarchy.errors import check_name, expect, expect_each, positive
+from hierarchy.gate import array_of
 from hierarchy.problem import Array, Hierarchy
 from hierarchy.state import State
 from hierarchy.task import Task
@@ -24,7 +25,8 @@ def activation(error: ArrayLike, buffer: float) -> Array:
 
     error : (m,) sigma_min + beta - sigma, in the unit of `buffer`, which is beta > 0.
     """
-    share = np.clip(np.asarray(error, dtype=float) / buffer, 0.0, 1.0)
+    width = positive("activation: buffer", buffer)
+    share = np.clip(array_of("activation: error", error) / width, 0.0, 1.0)
     return np.asarray(0.5 - 0.5 * np.cos(np.pi * share))
 
 
@@ -34,12 +36,15 @@ class Activation:
 
     `buffers` are the widths by the name of a task, in the unit of its error; such a task aims at
     the far end of its buffer, so its error is zero there. The rows of other tasks always act.
-    Raises HierarchyError if a width is not positive.
+    Raises HierarchyError if a width is not positive, or of none of the tasks.
     """
 
     def __init__(self, state: State, tasks: Sequence[Task], buffers: Mapping[str, float]) -> None:
+        expect_each("activation: tasks", tasks, Task, "see hierarchy.tasks")
+        expect("activation: buffers", buffers, Mapping, "give {task: width, ...}")
         for name, width in buffers.items():
             positive(f"task {name!r}: buffer", width)
+            check_name("task of a buffer", name, [task.name for task in tasks])
         self._state, self._buffers = state, dict(buffers)
         self._tasks = [(task, np.ones(task.dimension)) for task in tasks]
 

@@ -48,7 +48,7 @@ from typing import Annotated
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from hierarchy.errors import HierarchyError, brief, refuse
+from hierarchy.errors import HierarchyError, brief, check_choice, refuse
 from hierarchy.gate import array_of
 from hierarchy.jit import compiled, inlined
 from hierarchy.problem import Array
@@ -59,6 +59,9 @@ ROUNDING = 1e-12  # of a position, relative to 1 + its limit: closer to a limit 
 _FAR = 1e100      # [rad] stands for an infinite distance
 _CLEARANCE = 1e-3  # [rad or m] at which a horizon brings joints to rest before a position limit,
 #                    so that a disturbance of 0.02 rad/s does not shorten it
+
+
+_LEVELS = ("velocity", "acceleration")
 
 
 @dataclass(frozen=True)
@@ -101,6 +104,7 @@ class Limits:
         Both are finite. The command is a velocity or an acceleration, depending on `level`. Raises
         HierarchyError for q and v of another size, or a v that is not finite.
         """
+        check_choice("limits: level", level, _LEVELS)
         lower, upper = np.empty((2, self.packed.shape[1]))
         if not write_box(q, v, self.packed, level == "acceleration", lower, upper):
             raise HierarchyError(f"limits: q = {brief(q)} and v = {brief(v)}: expected "
@@ -114,7 +118,8 @@ class Limits:
         becomes the command in the box that comes nearest to a standstill. Raises HierarchyError
         for q, v or x of another size.
         """
-        command = np.array(x, dtype=float)
+        check_choice("limits: level", level, _LEVELS)
+        command = np.atleast_1d(array_of("limits: x", x))
         if not clamp_into_box(q, v, self.packed, level == "acceleration", command):
             raise HierarchyError(f"limits: {len(q)} positions, {len(v)} velocities and a command "
                                  f"of {len(command)} for {self.packed.shape[1]} joints")

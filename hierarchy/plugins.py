@@ -61,6 +61,7 @@ def register(group: Group, name: str, *, shipped: bool = False) -> Callable[[_Th
 
 def own(group: Group) -> dict[str, Any]:
     """Return what plugins register in a group by name, and what installed packages offer in it."""
+    check_name("group", group, GROUPS)
     for point in _points(group):
         _load(point, group)
     return dict(_registered[group])
@@ -68,12 +69,13 @@ def own(group: Group) -> dict[str, Any]:
 
 def registered(group: Group) -> dict[str, Any]:
     """Return what is registered in a group so far, without loading what packages offer in it."""
+    check_name("group", group, GROUPS)
     return {**_shipped[group], **_registered[group]}
 
 
 def known(group: Group) -> dict[str, Any]:
     """Return all of a group by name: what this package brings, then what plugins do."""
-    return {**_shipped[group], **own(group)}
+    return {**registered(group), **own(group)}
 
 
 def find(group: Group, name: str) -> Any | None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
+from os import PathLike
 from pathlib import Path
 from typing import Any, get_args
 
@@ -16,6 +17,8 @@ from hierarchy.avoidance.body import ControlPoint
 from hierarchy.errors import (
     RobotError,
     UnknownNameError,
+    as_float,
+    brief,
     check_name,
     expect,
     expect_each,
@@ -227,6 +230,8 @@ class Robot:
         may download files. `locked` and `root` are those of `from_file`. Raises RobotError and
         UnknownNameError.
         """
+        refuse(not isinstance(model, str | PathLike), "Robot.load: model: expected a name or a "
+               f"file, got {brief(model)}", RobotError)
         model = str(model)
         refuse(base is not None and not is_one_of(base, get_args(Base)), f"robot {model!r}: base "
                f"must be one of {get_args(Base)}, got {base!r}", RobotError)
@@ -316,9 +321,9 @@ class Robot:
         refuse(self.base != "floating", f"robot {self.name!r}: its base is fixed and has no speed",
                RobotError)
         for what, speed in (("linear", linear), ("angular", angular)):
-            refuse(not isinstance(speed, int | float) or not speed > 0.0, f"robot {self.name!r}: "
+            refuse(not as_float(speed) > 0.0, f"robot {self.name!r}: "
                    f"{what} speed of the base = {speed}, expected a number > 0", RobotError)
-        self.velocity_limit[:6] = np.repeat([linear, angular], 3)
+        self.velocity_limit[:6] = np.repeat([as_float(linear), as_float(angular)], 3)
 
     def frame(self, name: str, what: str = "frame") -> Frame:
         """Find the frame called `name`, which an error calls `what`.

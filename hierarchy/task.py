@@ -33,7 +33,7 @@ _GAINS = ("stiffness", "damping", "gain")
 _BINDS = ("measure", "writer", "distances", "follow_cone_error")  # a kernel
 _OF_STATE = ("error", "jacobian", "jacobian_derivative", "desired_velocity",
              "desired_acceleration", "reference_velocity", "reference_acceleration",
-             "error_reader", *_BINDS)
+             "error_reader", "rows", "box", "clamp", *_BINDS)
 
 
 def _made(kind: type, remedy: str) -> Check:
@@ -107,7 +107,7 @@ class Task(ABC):
         if "__eq__" not in vars(cls):  # a dataclass writes one that raises on arrays
             cls.__eq__ = equal  # type: ignore[method-assign]
         for name in _OF_STATE:
-            if name in vars(cls):
+            if callable(vars(cls).get(name)):  # `rows` may be a field
                 setattr(cls, name, _of_state(vars(cls)[name], name in _BINDS))
 
     def __post_init__(self) -> None:
@@ -360,6 +360,7 @@ class Written(Task):
 
     def rows(self, state: State, level: Level = "velocity") -> Rows:
         """The rows at a state; of forces, see `ForceTask`."""
+        check_choice(f"task {self.name!r}: level", level, get_args(Level))
         columns, known = state.n, self.on(state.robot)
         if self.of_forces:
             level = "acceleration" if self.contacts is None else "torque"

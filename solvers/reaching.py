@@ -259,12 +259,14 @@ class _Search:
         task = next(one for one in self.deciding if errors[one.name] > self.until)
         h = self._rows()
         k = h.names.index(task.name)
-        pull = h.A[h.offsets[k]:h.offsets[k + 1]].T @ h.slacks(np.zeros(h.n))[
-            h.offsets[k]:h.offsets[k + 1]]
+        rows = slice(h.offsets[k], h.offsets[k + 1])
+        asked = h.slacks(np.zeros(h.n))[rows]
+        pull = h.A[rows].T @ asked
         held = [*self._limits_at(-pull), *_above(h, k, -pull, self.limits)]
         said = nowhere(h, k, self.stack[task.name].row_names, np.zeros(h.n))
         by = f", held back by {listed(held)}" if held else f": {said}" if said else (
-            ": it is as near as the robot comes")
+            ": it is as near as the robot comes" if asked.any() else
+            f": its rows ask for no velocity, its gain is {task.gain:g}")
         return (f"unreachable: nearest found, {task.name} is missed by "
                 f"{errors[task.name]:.3g}{by}")
 

@@ -46,6 +46,7 @@ def pack_points(points: Sequence[ControlPoint]) -> Points:
 
 
 Vector = tuple[float, float, float]
+_MAKE = "see robot.capsules"
 _PARALLEL = 1e-12  # squared sine of the angle between two axes below which they count as parallel
 ON_AXIS = 1e-12  # [m] axes that meet have no direction between them
 
@@ -70,6 +71,7 @@ class Capsule:
 
 def pairs_of_chain(capsules: Sequence[Capsule]) -> tuple[tuple[int, int], ...]:
     """Every pair (i, j) of a chain of capsules, except neighbours, which share a joint."""
+    expect_each("capsules", capsules, Capsule, _MAKE)
     return tuple((i, j) for i, j in combinations(range(len(capsules)), 2) if j > i + 1)
 
 
@@ -95,7 +97,7 @@ def pairs_of_tree(capsules: Sequence[Capsule], parents: Sequence[int]) -> list[t
 
 def pack_capsules(capsules: Sequence[Capsule]) -> tuple[NDArray[np.int64], Array]:
     """Joints (K,), and start, end - start, radius (K, 7) [m] of capsules, for the kernels."""
-    expect_each("capsules", capsules, Capsule, "see robot.capsules")
+    expect_each("capsules", capsules, Capsule, _MAKE)
     joints = np.array([capsule.joint for capsule in capsules], dtype=np.int64)
     rows = [[*c.start, *np.subtract(c.end, c.start), c.radius] for c in capsules]
     return joints, np.array(rows, dtype=float).reshape(len(rows), 7)

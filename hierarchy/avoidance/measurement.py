@@ -7,7 +7,7 @@ import numpy as np
 
 from hierarchy.avoidance.laws import repulsion
 from hierarchy.avoidance.obstacles import Obstacles, distance_to_obstacle, turning_off_obstacle
-from hierarchy.errors import refuse, whole
+from hierarchy.errors import expect, refuse, whole
 from hierarchy.gate import shaped
 from hierarchy.jit import compiled
 from hierarchy.kinematics import Readings, dot, place, plus
@@ -127,7 +127,8 @@ class Pairs:
     __slots__ = ("acceleration", "direction", "distance", "radius", "straight", "table", "velocity")
 
     def __init__(self, points: int, obstacles: int) -> None:
-        self.__setstate__(np.zeros((points, obstacles, 14)))
+        self.__setstate__(np.zeros((whole("pairs: points", points),
+                                    whole("pairs: obstacles", obstacles), 14)))
         self.distance[:] = self.radius[:] = inf
 
     def __getstate__(self) -> Array:
@@ -142,6 +143,8 @@ class Pairs:
 
 def measure_pairs(pairs: Pairs, points: Array, obstacles: Obstacles) -> None:
     """Fill Pairs from known geometry: points (P, 3) [m] against the current obstacles (H)."""
+    expect("measure_pairs: pairs", pairs, Pairs, "make them with Pairs(points, obstacles)")
+    expect("measure_pairs: obstacles", obstacles, Obstacles, "make them with Obstacles([...])")
     points = shaped("measure_pairs: points", points, (len(pairs.table), 3))
     refuse(len(obstacles) != pairs.table.shape[1], f"measure_pairs: {len(obstacles)} obstacles, "
            f"and pairs of {pairs.table.shape[1]}")

@@ -7,7 +7,7 @@ from math import inf, sqrt
 import numpy as np
 from numpy.typing import ArrayLike
 
-from hierarchy.errors import check_name, expect, expect_each, finite_numbers, refuse
+from hierarchy.errors import check_name, expect, expect_each, finite_numbers, refuse, whole
 from hierarchy.gate import Rotation, array_of
 from hierarchy.jit import inlined, internal
 from hierarchy.kinematics import dot, less, turned
@@ -87,6 +87,7 @@ class Obstacles:
 
         Its `motion` remains that of its path: a sensor does not know about displacements by hand.
         """
+        h = whole("shift: h", h, 0, len(self) - 1)
         moved = finite_numbers("shift: offset [m]", offset, 3)
         self.table[h, _CENTRE] += moved - self.offset[h]
         self.offset[h] = moved

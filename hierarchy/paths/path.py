@@ -47,9 +47,12 @@ class Path(ABC):
         return lambda t: self.write(t, out)
 
     def __call__(self, t: float) -> Array:
-        """Position, velocity and acceleration at t [s] as rows of a new (3, 3) array."""
+        """Position, velocity and acceleration at t [s] as rows of a new (3, 3) array.
+
+        Raises HierarchyError unless t is a finite number.
+        """
         out = np.zeros((3, 3))
-        self.write(t, out)
+        self.write(number("path: t [s]", t), out)
         return out
 
 

@@ -26,7 +26,7 @@ def is_file_name(model: str) -> bool:
     """Whether `model` means a file: it exists, or has a suffix or a folder."""
     return model not in plugins.own("robots") and (
         model.lower().endswith(_SUFFIXES) or "/" in model or os.sep in model
-        or ("." in model and Path(model).is_file()))
+        or ("." in model and os.path.isfile(model)))  # noqa: PTH113 - raises for no name
 
 
 def elsewhere(name: str) -> str:

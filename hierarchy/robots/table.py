@@ -1,10 +1,33 @@
 """Robots as tables of numbers: a serial arm by its Denavit-Hartenberg parameters, or any tree."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Literal
+from functools import partial
+from typing import Annotated, Literal
 
-Vector = tuple[float, float, float]
+from hierarchy.errors import brief, expect, expect_each, finite_numbers, number, real, refuse
+from hierarchy.gate import array_of, direction
+from hierarchy.records import NotNegative, check_fields
+
+
+def _limit(what: str, value: object) -> float:
+    found = real(what, value)
+    refuse(found < 0.0, f"{what} = {found:g}: expected a number >= 0")
+    return found
+
+
+def _limits(what: str, values: object) -> None:
+    found = array_of(what, values)
+    refuse(found.ndim != 1, f"{what}: expected a list of numbers, got {brief(values)}")
+    for i, value in enumerate(found):
+        _limit(f"{what}[{i}]", value)
+
+
 Base = Literal["fixed", "floating"]
+Name = Annotated[str, partial(expect, kind=str, remedy="give a name")]
+Vector = Annotated[tuple[float, float, float], partial(finite_numbers, size=3)]
+Numbers = Annotated[tuple[float, ...], finite_numbers]
+Limits = Annotated[tuple[float, ...], _limits]
 
 
 @dataclass(frozen=True)
@@ -14,19 +37,27 @@ class DHTable:
     One entry per joint: a, d [m], alpha [deg]; position limits +-`range` [deg]; `velocity` [rad/s];
     `effort` limits [N m]; `mass` [kg] of the link that the joint moves. Each link is a
     uniform rod of radius `radius` [m] between its joint and the next. `control_points` are (joint,
-    offset (3,) [m] in the joint's frame).
+    offset (3,) [m] in the joint's frame). Raises HierarchyError for entries that do not fit.
     """
 
-    name: str
-    a: tuple[float, ...]
-    d: tuple[float, ...]
-    alpha: tuple[float, ...]
-    range: tuple[float, ...]
-    velocity: tuple[float, ...]
-    effort: tuple[float, ...]
-    mass: tuple[float, ...]
-    radius: float
+    name: Name
+    a: Numbers
+    d: Numbers
+    alpha: Numbers
+    range: Limits
+    velocity: Limits
+    effort: Limits
+    mass: Numbers
+    radius: NotNegative
     control_points: tuple[tuple[str, Vector], ...]
+
+    def __post_init__(self) -> None:
+        check_fields(self, f"table {self.name!r}")
+        expect_each(f"table {self.name!r}: control_points", self.control_points, Sequence,
+                    "give (joint, offset)")
+        for name in ("a", "alpha", "range", "velocity", "effort", "mass"):
+            refuse(len(getattr(self, name)) != len(self.d), f"table {self.name!r}: {name} has "
+                   f"{len(getattr(self, name))} entries, and d {len(self.d)}, one for each joint")
 
 
 @dataclass(frozen=True)
@@ -38,9 +69,12 @@ class Link:
     """
 
     end: Vector = (0.0, 0.0, 0.0)
-    radius: float = 0.0
-    mass: float = 0.0
+    radius: NotNegative = 0.0
+    mass: NotNegative = 0.0
     start: Vector = (0.0, 0.0, 0.0)
+
+    def __post_init__(self) -> None:
+        check_fields(self, "link")
 
 
 @dataclass(frozen=True)
@@ -53,15 +87,20 @@ class TreeJoint:
     the default initial configuration.
     """
 
-    name: str
-    parent: str
+    name: Name
+    parent: Name
     at: Vector
     axis: Literal["x", "y", "z"]
-    range: tuple[float, float]
-    velocity: float
-    effort: float
-    link: Link = Link()
-    rest: float = 0.0
+    range: Annotated[tuple[float, float], partial(finite_numbers, size=2)]
+    velocity: Annotated[float, _limit]
+    effort: Annotated[float, _limit]
+    link: Annotated[Link, partial(expect, kind=Link, remedy="give a Link")] = Link()
+    rest: Annotated[float, number] = 0.0
+
+    def __post_init__(self) -> None:
+        check_fields(self, f"joint {self.name!r}")
+        refuse(self.range[0] > self.range[1], f"joint {self.name!r}: range: expected (lower, "
+               f"upper), got {brief(self.range)}")
 
 
 @dataclass(frozen=True)
@@ -71,10 +110,13 @@ class TreeFrame:
     Its axes are those of the joint, or turned so that z is `z_axis`.
     """
 
-    name: str
-    joint: str
+    name: Name
+    joint: Name
     offset: Vector
-    z_axis: Vector = (0.0, 0.0, 1.0)
+    z_axis: Annotated[tuple[float, float, float], direction] = (0.0, 0.0, 1.0)
+
+    def __post_init__(self) -> None:
+        check_fields(self, f"frame {self.name!r}")
 
 
 @dataclass(frozen=True)
@@ -86,14 +128,23 @@ class TreeTable:
     link), "" being the base, and `control_points` as (joint, offset (3,) [m]).
     """
 
-    name: str
+    name: Name
     joints: tuple[TreeJoint, ...]
     frames: tuple[TreeFrame, ...]
-    end_effector: str
+    end_effector: Name
     links: tuple[tuple[str, Link], ...] = ()
     control_points: tuple[tuple[str, Vector], ...] = ()
     base: Base = "fixed"
-    base_height: float = 0.0
+    base_height: Annotated[float, number] = 0.0
+
+    def __post_init__(self) -> None:
+        what = f"table {self.name!r}"
+        check_fields(self, what)
+        expect_each(f"{what}: joints", self.joints, TreeJoint, "give TreeJoint(...)")
+        expect_each(f"{what}: frames", self.frames, TreeFrame, "give TreeFrame(...)")
+        expect_each(f"{what}: links", self.links, Sequence, "give (joint, link)")
+        expect_each(f"{what}: control_points", self.control_points, Sequence,
+                    "give (joint, offset)")
 
 
 Table = DHTable | TreeTable

@@ -75,7 +75,7 @@ class Along(Written):
         expect(f"task {self.name!r}: task", self.task, Position, "give a position task")
         try:
             D = np.array(self.directions, dtype=float)
-        except (TypeError, ValueError):
+        except (TypeError, ValueError, OverflowError):
             D = np.empty(0)
         self.refuse(D.ndim != 2 or D.shape[1:] != (3,) or not np.allclose(D @ D.T, np.eye(len(D))),
                     f"directions {self.directions!r} are not of length one and orthogonal, (m, 3)")
@@ -97,6 +97,10 @@ class Along(Written):
     def desired_velocity(self, state: State) -> Array:
         """Velocity of the path along the directions (m,) [m/s]."""
         return np.asarray(self.directions) @ self.task.desired_velocity(state)
+
+    def desired_acceleration(self, state: State) -> Array:
+        """Acceleration of the path along the directions (m,) [m/s^2]."""
+        return np.asarray(self.directions) @ self.task.desired_acceleration(state)
 
     def writer(self, state: State, level: Level, rows: Rows) -> Writer:
         """See `Task.writer`."""

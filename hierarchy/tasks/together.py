@@ -6,7 +6,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from hierarchy.contacts import Contacts
-from hierarchy.errors import expect_each
+from hierarchy.errors import expect, expect_each
 from hierarchy.problem import Array
 from hierarchy.records import set_frozen
 from hierarchy.robot import Robot
@@ -81,6 +81,10 @@ class Together(NamedRows, Written):
         """Those of the tasks (m,), which `solve_ik` with `until` leaves out of the rows."""
         return np.hstack([task.desired_velocity(state) for task in self.tasks])
 
+    def desired_acceleration(self, state: State) -> Array:
+        """Those of the tasks (m,)."""
+        return np.hstack([task.desired_acceleration(state) for task in self.tasks])
+
     def writer(self, state: State, level: Level, rows: Rows) -> Writer:
         """See `Task.writer`."""
         parts = rows.split([task.dimension for task in self.tasks])
@@ -111,6 +115,7 @@ class TangentCone(NamedRows, Written):
     kind: Kind = field(init=False, repr=False, compare=False, default="inequality")
 
     def __post_init__(self) -> None:
+        expect("set-based task", self.task, Task, "see hierarchy.tasks")
         self.task.refuse(self.task.kind != "inequality", "a set-based task has inequalities, got "
                          f"kind = {self.task.kind!r}")
         set_frozen(self, name=self.task.name)

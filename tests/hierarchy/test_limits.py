@@ -12,6 +12,7 @@ from hierarchy import State
 from hierarchy.jit import compiled
 from hierarchy.limits import Limits, write_box
 from hierarchy.tasks import JointLimits, TorqueLimits
+from hierarchy.tasks.joints.joint_limits import StepLimits
 
 PLAIN = os.environ.get("NUMBA_DISABLE_JIT") == "1"  # everything some hundred times slower
 JOINTS, TICKS = (40, 60) if PLAIN else (500, 400)
@@ -292,8 +293,10 @@ def test_the_error_is_how_far_a_joint_is_from_its_range():
     task, q = JointLimits(ROBOT, 10.0, 1e-3, margin=0.1), np.zeros(7)
     q[0], q[3] = ROBOT.upper[0], ROBOT.lower[3] - 0.2
     state = State.at(ROBOT, q)
-    np.testing.assert_allclose(task.error(state), [-0.1, 0, 0, 0.3, 0, 0, 0], atol=1e-15)
+    np.testing.assert_allclose(task.error(state), [0.1, 0, 0, 0.3, 0, 0, 0], atol=1e-15)
     assert (task.dimension, task.kind) == (7, "inequality")
+    steps, beyond = StepLimits(ROBOT, 1.0, 0.5), State.at(ROBOT, q + 0.2 * (q > 0))
+    np.testing.assert_allclose(steps.error(beyond), [0.1, 0, 0, 0.1, 0, 0, 0], atol=1e-15)
     np.testing.assert_array_equal(task.jacobian(state), np.eye(7))
     assert not task.jacobian_derivative(state).any()
 

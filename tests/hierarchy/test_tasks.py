@@ -150,6 +150,17 @@ def test_rates_of_a_frame_that_follows_a_path_are_the_derivatives_of_its_error(a
                                rtol=1e-5, atol=1e-5)
 
 
+def test_a_task_made_of_others_has_the_feedforward_of_their_paths():
+    """Its desired acceleration was zero."""
+    state, task, along = state_at(*STATES[0]), TASKS["position"], TASKS["along"]
+    both = tasks.Together([task, TASKS["posture"]])
+    for wanted in ("desired_velocity", "desired_acceleration"):
+        found = getattr(task, wanted)(state)
+        assert np.linalg.norm(found) > 0.01
+        np.testing.assert_allclose(getattr(along, wanted)(state), along.directions @ found)
+        np.testing.assert_allclose(getattr(both, wanted)(state), [*found, *np.zeros(7)])
+
+
 @pytest.mark.parametrize(("kind", "given", "other"), [
     (tasks.LookAt, {"target": np.array([0.3, 0.5, 0.1])}, [0.1, -0.4, 0.2]),
     (tasks.Pose, {"path": PATH, "rotation": np.eye(3)}, np.diag([1.0, -1.0, -1.0])),

@@ -1,6 +1,6 @@
 """Wrong values given to robots, states, paths, tasks and stacks: each with what it says."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 from threading import Event
@@ -13,8 +13,8 @@ from scene import FRAME, ROBOT, SENSOR, state_at
 from standing import CONTACTS, feet, opening
 from standing import ROBOT as HUMANOID
 
-from hierarchy import Hierarchy, Robot, Stack, State, Task, tasks
-from hierarchy.activation import Activation
+from hierarchy import Hierarchy, Robot, Stack, State, Task, plugins, tasks
+from hierarchy.activation import Activation, activation
 from hierarchy.avoidance import (
     Barrier,
     Capsule,
@@ -26,6 +26,7 @@ from hierarchy.avoidance import (
     Repulsion,
     SurveillanceAreas,
     measure_pairs,
+    pairs_of_chain,
 )
 from hierarchy.contacts import Contact, Contacts, corners
 from hierarchy.gate import check_rotation
@@ -34,7 +35,10 @@ from hierarchy.loop import Loop
 from hierarchy.measured import Measured
 from hierarchy.paths import Blended, Jittered, Shifted, Still, circle, read_bvh
 from hierarchy.robot import Frame
+from hierarchy.robots import TABLES, Link, TreeFrame, TreeTable
+from hierarchy.tasks.joints.coupling import FollowedJoints
 from hierarchy.tasks.joints.joint_limits import StepLimits
+from hierarchy.tasks.together import TangentCone
 from hierarchy.words import some
 
 NAN, INF = float("nan"), float("inf")
@@ -365,6 +369,50 @@ def limits(**settings):
     (grown, "task 'along': it has 2 rows, and arrays of 1 were made; make another"),
     (lambda: StepLimits(ROBOT, 0.01, 0.0), "gain [1/s] = 0: expected a number > 0"),
     (lambda: Obstacles([Obstacle("point", (0, 0, 0))]).shift(0, (NAN, 0, 0)), "shift: offset [m]"),
+    *((lambda h=h: Obstacles([Obstacle("point", (0, 0, 0))]).shift(h, (0, 0, 1)),
+       f"shift: h = {h!r}: expected a whole number from 0 to 0") for h in (-1, 1, None)),
+    *((lambda t=t: THERE(t), f"path: t [s] = {t!r}: expected a finite number")
+      for t in (NAN, INF, None)),
+    (lambda: Robot.load(TABLES["kuka_lwr"]), "model: expected a name or a file, got DHTable"),
+    (lambda: Robot.load("a." * 5000), "unknown robot 'a.a."),
+    (lambda: replace(TABLES["kuka_lwr"], a=(0.0,)), "'kuka_lwr': a has 1 entries, and d 7, one"),
+    (lambda: replace(TABLES["kuka_lwr"], effort=(-1.0,) * 7), "effort[0] = -1: expected a number"),
+    (lambda: replace(TABLES["kuka_lwr"], mass=(NAN,) * 7), "mass: expected finite numbers, got"),
+    *((lambda kind=kind, wrong=wrong: kind(**wrong), said) for kind, wrong, said in (
+        (Link, {"mass": -1.0}, "link: mass = -1: expected a finite number from 0 on"),
+        (Link, {"end": None}, "link: end: expected 3 finite numbers, got NoneType None"),
+        (TreeFrame, {"name": "f", "joint": "", "offset": (0, 0, 0), "z_axis": (0, 0, 0)},
+         "frame 'f': z_axis: tuple (0, 0, 0) is no direction"),
+        (TreeTable, {"name": "t", "joints": ("a",), "frames": (), "end_effector": "a"},
+         "table 't': joints[0]: expected a TreeJoint, got str 'a'"))),
+    *((lambda wrong=wrong: replace(TABLES["quadruped"].joints[0], name="j", **wrong), said)
+      for wrong, said in (({"axis": "w"}, "joint 'j': axis = 'w': expected one of 'x', 'y', 'z'"),
+                          ({"range": (1, -1)}, "range: expected (lower, upper), got tuple (1, -1)"),
+                          ({"velocity": NAN}, "joint 'j': velocity = nan: expected a number"),
+                          ({"link": None}, "'j': link: expected a Link, got NoneType None"))),
+    *((lambda ask=ask: ask(LIMITS), said) for ask, said in (
+        (lambda task: task.box(None, "velocity"), "'joint limits': state: expected a State, got"),
+        (lambda task: task.clamp(3, "velocity", A[0]), "'joint limits': state: expected a State"),
+        (lambda task: task.rows("x"), "'joint limits': state: expected a State, got str 'x'"),
+        (lambda task: task.box(STATE, "speed"), "level = 'speed': expected one of 'velocity', 'ac"),
+        (lambda task: task.clamp(STATE, "speed", A[0]), "level = 'speed': expected one of"),
+        (lambda task: task.clamp(STATE, "velocity", "x"), "x is not an array of numbers: str 'x'"),
+        (lambda task: task.clamp(STATE, "velocity", None), "and a command of 1 for 7 joints"))),
+    (lambda: plugins.known("task"), "unknown group 'task'; did you mean 'tasks'?"),
+    (lambda: Pairs(-1, 2), "pairs: points = -1: expected a whole number from 0 on"),
+    (lambda: measure_pairs(None, B, Obstacles()), "measure_pairs: pairs: expected a Pairs, got No"),
+    (lambda: measure_pairs(Pairs(1, 0), B, []), "obstacles: expected an Obstacles, got list []"),
+    (lambda: pairs_of_chain(3), "capsules: expected a Sequence, got int 3"),
+    *((lambda width=width: activation(B, width), f"activation: buffer = {width}: expected")
+      for width in (0, -1, NAN)),
+    (lambda: activation("x", 0.1), "activation: error is not an array of numbers: str 'x'"),
+    (lambda: Activation(STATE, "x", {}), "activation: tasks[0]: expected a Task, got str 'x'"),
+    (lambda: Activation(STATE, [HAND], [0.1]), "buffers: expected a Mapping, got list [0.1]"),
+    (lambda: Activation(STATE, [HAND], {"positon": 0.1}), "did you mean 'position'"),
+    (lambda: TangentCone("x"), "set-based task: expected a Task, got str 'x'"),
+    (lambda: FollowedJoints(ROBOT, ()), "task 'couplings': no joints are coupled"),
+    (lambda: FollowedJoints(ROBOT, ["x"]), "coupled[0]: expected a Coupled, got str 'x'"),
+    (lambda: tasks.Along(HAND, 10**400), "are not of length one and orthogonal"),
     (lambda: Robot.load("nowhere.SDF"), "does not exist"),
     (lambda: Robot.load("/"), "is a folder")])
 def test_a_wrong_value_is_refused_and_named(make, said):

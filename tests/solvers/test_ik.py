@@ -343,6 +343,9 @@ def test_what_holds_a_target_out_of_reach_back_is_said():
     assert found.errors["position"] == pytest.approx(3.0 - top, abs=1e-6)
     assert found.verdict.startswith("unreachable: nearest found, position is missed by")
     assert "no joint moves position along z" in found.verdict
+    idle = Position(FRAME, Still([0.1, 0.5, 0.1]), gain=0.0)  # it was as near as the robot comes
+    assert solve_ik(ROBOT, Q, [idle], until=1e-3).verdict.endswith(
+        ": its rows ask for no velocity, its gain is 0")
     here = State.at(ROBOT, Q).position(FRAME)
     tasks = [JointCoupling(ROBOT, {"joint_7": 1.0}, Q[6]),  # which holds nothing back
              Position(FRAME, Still(here)), Position(FRAME, Still(here + 0.1), name="other")]

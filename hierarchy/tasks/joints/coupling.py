@@ -10,7 +10,7 @@ from typing import Annotated, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from hierarchy.errors import HierarchyError, expect, number
+from hierarchy.errors import HierarchyError, expect, expect_each, number
 from hierarchy.measured import Measure, Measured, measured
 from hierarchy.paths.path import polynomial
 from hierarchy.problem import Array
@@ -102,6 +102,8 @@ class FollowedJoints(_Coupling):
 
     def __post_init__(self) -> None:
         super().__post_init__()
+        expect_each(f"task {self.name!r}: coupled", self.coupled, Coupled, "see Robot.coupled")
+        self.refuse(not self.coupled, "no joints are coupled")
         terms: list[tuple[int, str, tuple[float, ...]]] = []
         for row, one in enumerate(self.coupled):
             constant, *others = one.coefficients

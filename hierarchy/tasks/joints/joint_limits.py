@@ -110,7 +110,7 @@ class JointLimits(JointRows):
         first, positions, rates = self.first, self._positions(state), self._rates(state, level)
         if first == 0:
             return self.limits.clamp(positions, rates, level, x)
-        command = np.array(x, dtype=float)
+        command = np.atleast_1d(array_of(f"task {self.name!r}: x", x))
         command[:first][~np.isfinite(command[:first])] = 0.0
         command[first:] = self.limits.clamp(positions, rates, level, command[first:])
         return command
@@ -118,7 +118,7 @@ class JointLimits(JointRows):
     def error(self, state: State) -> Array:
         """Distance of each joint from its range (n,) [rad or m], zero inside it."""
         q = self._positions(state)
-        return np.asarray(np.clip(q, *self.limits.packed[:2]) - q)
+        return np.abs(np.clip(q, *self.limits.packed[:2]) - q)
 
     def writer(self, state: State, level: Level, rows: Rows) -> Writer:
         """See `Task.writer`; the rows have two sides."""
@@ -189,8 +189,9 @@ class StepLimits(JointRows):
         return lower, upper
 
     def error(self, state: State) -> Array:
-        """How far each velocity would have to be raised from zero (n,) [rad/s or m/s]."""
-        return np.maximum(self.box(state)[0], 0.0)
+        """How far each velocity would have to be from zero (n,) [rad/s or m/s]."""
+        lower, upper = self.box(state)
+        return np.maximum(np.maximum(lower, -upper), 0.0)
 
     def writer(self, state: State, level: Level, rows: Rows) -> Writer:
         """See `Task.writer`; for velocity level."""
