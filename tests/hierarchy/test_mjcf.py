@@ -283,12 +283,14 @@ def test_tendons_that_keep_their_length_couple_their_joints(written):
     ('<connect name="close" body1="a" body2="c" anchor=".1 .2 .3"/>', False),
     ('<connect name="close" body1="c" anchor=".1 .2 .3"/>', False),
     ('<connect name="close" site1="a_tip" site2="c_tip"/>', False),
+    ('<connect name="close" site1="c_tip" site2="mark"/>', False),
     ('<weld name="close" body1="a" body2="c"/>', True),
     ('<weld name="close" body1="a" body2="c" anchor=".1 .2 .3" relpose=".1 .3 .2 .5 .5 .5 .5"/>',
      True),
     ('<weld name="close" site1="a_tip" site2="c_tip"/>', True)])
 def test_closed_chains_join_the_frames_that_mujoco_joins(equality, rigid, written):
-    path = written(world(link("a", 'axis="0 0 1"', link("b", more=link("c", 'axis="1 1 0"'))),
+    chain = link("a", 'axis="0 0 1"', link("b", more=link("c", 'axis="1 1 0"')))
+    path = written(world('<site name="mark" pos=".2 .4 .1" euler="0 0 30"/>' + chain,
                          f"<equality>{equality}</equality>"))
     robot = Robot.load(path)
     loop, = robot.loops
