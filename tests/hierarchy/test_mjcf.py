@@ -138,6 +138,16 @@ def test_what_would_fill_the_memory_is_no_robot(written):
     refused("has 401 velocities, of at most 400", Robot.load, path, error=RobotError)
 
 
+@pytest.mark.parametrize(("inside", "sections", "said"), [
+    (link("a", 'range="nan 1" limited="true"'), "", "jnt_range of joint 'a_joint' is not a number"),
+    (link("a"), '<option gravity="0 0 nan"/>', "gravity is not a number"),
+    (link("a"), '<keyframe><key name="k" qpos="nan"/></keyframe>', "key_qpos of key 'k'"),
+    (link("a"), '<equality><joint joint1="a_joint" polycoef="nan"/></equality>',
+     "eq_data of equality 'equality 0'")])
+def test_what_is_not_a_number_is_refused(inside, sections, said, written):
+    refused(said, Robot.load, written(world(inside, sections)), error=RobotError)
+
+
 def test_a_base_floats_where_it_is_asked_to(written):
     path = written(world(link("a")))
     robot, held = Robot.load(path, base="floating"), Robot.load(path)
