@@ -143,8 +143,9 @@ def test_what_would_fill_the_memory_is_no_robot(written):
     (link("a"), '<option gravity="0 0 nan"/>', "gravity is not a number"),
     (link("a"), '<keyframe><key name="k" qpos="nan"/></keyframe>', "key_qpos of key 'k'"),
     (link("a"), '<equality><joint joint1="a_joint" polycoef="nan"/></equality>',
-     "eq_data of equality 'equality 0'")])
-def test_what_is_not_a_number_is_refused(inside, sections, said, written):
+     "eq_data of equality 'equality 0'"),
+    (link("a", 'armature="-1"'), "", "the armature of a_joint is negative")])
+def test_numbers_that_no_robot_has_are_refused(inside, sections, said, written):
     refused(said, Robot.load, written(world(inside, sections)), error=RobotError)
 
 
