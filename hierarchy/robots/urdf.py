@@ -167,8 +167,9 @@ def _of_joint(joint: Element, links: list[str], kinds: dict[str, str | None]) ->
     if kind in _WITH_AXIS:
         yield from _unread(joint, "axis", 3, xyz="")
         axis = attribute_of(joint, "axis", "xyz")
-        if axis is not None and not any(numbers_in(axis, 3) or (1.0,)):
-            yield f"its axis is zero: {axis!r}"
+        squared = sum(x * x for x in numbers_in(axis or "", 3) or (1.0,))
+        if not np.finfo(float).tiny <= squared < np.inf:  # else it cannot be made of length 1
+            yield f"its axis is {'too long' if squared > 1.0 else 'zero'}: {axis!r}"
     yield from _unread(joint, "origin", 3, xyz="0 0 0", rpy="0 0 0")
     yield from _unread(joint, "limit", 1, lower="0", upper="0", velocity="0", effort="0")
     yield from _of_limit(joint, kind)

@@ -138,6 +138,17 @@ def test_what_would_fill_the_memory_is_no_robot(written):
     refused("has 401 velocities, of at most 400", Robot.load, path, error=RobotError)
 
 
+@pytest.mark.parametrize(("inside", "sections", "said"), [
+    (link("a", 'range="nan 1" limited="true"'), "", "jnt_range of joint 'a_joint' is not a number"),
+    (link("a"), '<option gravity="0 0 nan"/>', "gravity is not a number"),
+    (link("a"), '<keyframe><key name="k" qpos="nan"/></keyframe>', "key_qpos of key 'k'"),
+    (link("a"), '<equality><joint joint1="a_joint" polycoef="nan"/></equality>',
+     "eq_data of equality 'equality 0'"),
+    (link("a", 'armature="-1"'), "", "the armature of a_joint is negative")])
+def test_numbers_that_no_robot_has_are_refused(inside, sections, said, written):
+    refused(said, Robot.load, written(world(inside, sections)), error=RobotError)
+
+
 def test_a_base_floats_where_it_is_asked_to(written):
     path = written(world(link("a")))
     robot, held = Robot.load(path, base="floating"), Robot.load(path)
@@ -283,12 +294,14 @@ def test_tendons_that_keep_their_length_couple_their_joints(written):
     ('<connect name="close" body1="a" body2="c" anchor=".1 .2 .3"/>', False),
     ('<connect name="close" body1="c" anchor=".1 .2 .3"/>', False),
     ('<connect name="close" site1="a_tip" site2="c_tip"/>', False),
+    ('<connect name="close" site1="c_tip" site2="mark"/>', False),
     ('<weld name="close" body1="a" body2="c"/>', True),
     ('<weld name="close" body1="a" body2="c" anchor=".1 .2 .3" relpose=".1 .3 .2 .5 .5 .5 .5"/>',
      True),
     ('<weld name="close" site1="a_tip" site2="c_tip"/>', True)])
 def test_closed_chains_join_the_frames_that_mujoco_joins(equality, rigid, written):
-    path = written(world(link("a", 'axis="0 0 1"', link("b", more=link("c", 'axis="1 1 0"'))),
+    chain = link("a", 'axis="0 0 1"', link("b", more=link("c", 'axis="1 1 0"')))
+    path = written(world('<site name="mark" pos=".2 .4 .1" euler="0 0 30"/>' + chain,
                          f"<equality>{equality}</equality>"))
     robot = Robot.load(path)
     loop, = robot.loops

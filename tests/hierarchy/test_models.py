@@ -142,6 +142,8 @@ PLAIN = {"link": "", "kind": "revolute", "parent": "base", "axis": "0 0 1", "mim
 LOOP = '<joint name="back" type="fixed"><parent link="fore"/><child link="upper"/></joint>'
 WRONG = [
     ({"axis": "0 0 0"}, "joint 'shoulder': its axis is zero"),
+    ({"axis": "1e-200 0 0"}, "joint 'shoulder': its axis is zero"),
+    ({"axis": "0 1e200 0"}, "joint 'shoulder': its axis is too long"),
     ({"axis": "0 1"}, "joint 'shoulder': its axis xyz = '0 1' is not three finite numbers"),
     ({"parent": "nobody"}, "joint 'shoulder': its parent link 'nobody' does not exist"),
     ({"limit": '<limit lower="nan" upper="0.5"/>'}, "its limit lower = 'nan'(?!.* is above)"),

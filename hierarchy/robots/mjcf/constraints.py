@@ -119,8 +119,11 @@ def left_out(built: Built) -> Iterator[str]:
 
 
 def refuse(file: Compiled) -> None:
-    """Raise RobotError for inertia that no body or joint has: that of a tendon, or of its drive."""
+    """Raise RobotError for inertia that no robot has: negative, of a tendon, or of its drive."""
     mj = file.model
+    if negative := [name for name, v in zip(file.joints, mj.jnt_dofadr, strict=True)
+                    if mj.dof_armature[v] < 0.0]:
+        raise file.error(f"the armature of {some(negative)} is negative")
     drives = armature(mj, "actuator", len(mj.actuator_trnid))
     on_joint = {i for i, _, _ in joint_actuators(mj)}
     heavy = [f"tendon {name_of(mj, 'tendon', i)!r}" for i in range(mj.ntendon)

@@ -62,7 +62,7 @@ def build(part: Part) -> Built:
             built.bodies[body] = add_frame(built.model, part.compiled.bodies[body], joint, place,
                                            "body")
     for site in range(mj.nsite):
-        if (body := int(mj.site_bodyid[site])) in part.bodies:
+        if (body := int(mj.site_bodyid[site])) in part.bodies | {WORLD}:  # a loop may end there
             joint, place = built.placed[body]
             built.sites[site] = add_frame(
                 built.model, part.compiled.sites[site], joint,

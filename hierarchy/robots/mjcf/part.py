@@ -2,7 +2,7 @@
 
 import warnings
 from collections import Counter
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -67,8 +67,26 @@ def compiled(path: Path) -> Compiled:
     bodies = _names(model, "body", model.nbody)
     of_body = [f"{bodies[body]} {KINDS[kind]}"
                for body, kind in zip(model.jnt_bodyid, model.jnt_type, strict=True)]
-    return Compiled(file, model, _names(model, "joint", model.njnt, of_body), bodies,
-                    _names(model, "site", model.nsite), _names(model, "key", model.nkey), missing)
+    found = Compiled(file, model, _names(model, "joint", model.njnt, of_body), bodies,
+                     _names(model, "site", model.nsite), _names(model, "key", model.nkey), missing)
+    for what in _without_number(model):
+        raise found.error(f"{what} is not a number")
+    return found
+
+
+def _without_number(model: Any) -> Iterator[str]:
+    """Yield what of a model is NaN, which MuJoCo only prints a warning about."""
+    for part in (model, model.opt):
+        for name in dir(part):
+            values = getattr(part, name)
+            if isinstance(values, np.ndarray) and values.dtype.kind == "f" and (
+                    found := np.argwhere(np.isnan(values))).size:
+                kind = _OBJECTS.get(name.partition("_")[0])
+                yield f"{name} of {kind} {name_of(model, kind, found[0, 0])!r}" if kind else name
+
+
+_OBJECTS = {"jnt": "joint", "eq": "equality"} | {kind: kind for kind in (
+    "body", "geom", "site", "tendon", "actuator", "key")}  # by how names of arrays begin
 
 
 def _compiled(spec: Any) -> Any:
