@@ -341,3 +341,27 @@ def test_a_chain_in_a_plane_moves_although_its_file_is_rounded(rigid, rounding):
     np.testing.assert_allclose(ends[0], ends[1], atol=1e-9)
     assert np.abs(ends[0] - begin).max() > 0.1, "it moved"
     assert Mechanism(planar_bar(rigid, 0.0)).gap(ends[0])[0] < 1e-8 + 20.0 * rounding
+
+
+@pytest.mark.parametrize("level", ["velocity", "acceleration"])
+@pytest.mark.parametrize("factor", [0.5, 2.0, -3.0])
+def test_a_joint_stops_before_its_limit_as_what_follows_it_can(tmp_path, level, factor):
+    """A joint that another follows twice as fast passed its limit by 0.07 rad, SOLVED."""
+    path = tmp_path / "a.urdf"
+    wide = f'<limit lower="-4" upper="4" velocity="2"/><mimic joint="a" multiplier="{factor}"/>'
+    path.write_text(urdf(*(link(name, "") for name in ("l0", "l1", "l2")),
+                         joint("a", "revolute", "l0", "l1", LIMIT),
+                         joint("b", "revolute", "l1", "l2", wide)))
+    robot, most, q, v = Robot.load(path), 5.0, np.zeros(2), np.zeros(2)
+    stack = Stack([*model_rows(robot, T), JointLimits(robot, most, T), Posture({"a": 3.0})], level)
+    state, resolver = State(robot), make("hcod")
+    for tick in range(300):
+        state.move(tick * T, q, v)
+        if level == "velocity":
+            state.commanded = v
+        x = resolver.solve(stack.hierarchy(state)).x
+        w = x if level == "velocity" else v + T * x
+        q, before, v = q + T * (w if level == "velocity" else (v + w) / 2.0), v, w
+        assert q[0] <= 1.0 + 1e-9
+        assert np.abs(v - before).max() <= most * T + 1e-9
+    assert q[0] == pytest.approx(1.0, abs=1e-6)

@@ -83,6 +83,12 @@ class JointLimits(JointRows):
         for what, limit in (("base_speed", speed), ("base_acceleration", rate)):
             if (given := getattr(self, what)) is not None:
                 limit[:6] = np.repeat(finite_numbers(f"task {self.name!r}: {what}", given, 2), 3)
+        # Coupled joints stop together: as the slowest of them. Each pass reaches one joint further.
+        for one in robot.coupled * (1 + len(robot.coupled)):
+            if one.other and len(one.coefficients) == 2 and (slope := abs(one.coefficients[1])):
+                led, leader = map(robot.velocity_names.index, (one.joint, one.other))
+                rate[leader] = min(rate[leader], rate[led] / slope)
+                rate[led] = min(rate[led], slope * rate[leader])
         of = slice(self.first, robot.n)
         with naming(f"task {self.name!r}"):
             set_frozen(self, limits=Limits(lower[of] + self.margin, upper[of] - self.margin,
