@@ -25,7 +25,7 @@ from scenarios.results.store import TABLE, FullError, write_table
 Progress = Callable[[str, int, int], None]
 
 TIMED = 1000  # ticks that are timed alone after runs side by side
-_SHARE = 0.2  # of the time that is spent on pages while runs are still being made
+_SHARE = 0.1  # of the time that is spent on pages while runs are still being made
 
 
 def compare(scenarios: Iterable[str | Scenario] | str | Scenario,
