@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from scipy.sparse import csc_matrix
 
 _RANK, _SETTLED = 1e-8, 1e-7  # of `level_problem`: rank tolerance, and miss of a row that is kept
+_FAR = 1e6  # sizes of y beyond which proxqp does not come back from a guess, in seconds
 _WARNINGS = Lock()  # their filters belong to the process: threads would restore each other's
 
 
@@ -67,6 +68,8 @@ class Program(NamedTuple):
         size = unit * max(float(norm(self.q)) / weight, float(
             abs(np.clip(0.0, self.lower, self.upper)).max(initial=0.0))) or 1.0
         start = None if self.start is None else self.start / size
+        if start is not None and not norm(start) <= _FAR:
+            start = None
         return Program(self.P / weight, self.q / (weight * size), self.A, self.lower / size,
                        self.upper / size, self.F, self.f / size, start), size
 
