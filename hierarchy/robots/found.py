@@ -83,7 +83,7 @@ def is_floating(model: Any) -> bool:
 
 
 def remarks(model: Any) -> Iterator[str]:
-    """Yield a sentence for each kind of limit that joints lack, and for ambiguous frames."""
+    """Yield a sentence for limits and masses that joints lack, and for ambiguous frames."""
     joints = [joint for joint in model.joints[1 + is_floating(model):] if joint.nv > 0]
     for kind, limit in (("velocity", model.upperVelocityLimit), ("effort", model.effortLimit)):
         without = [str(model.names[joint.id]) for joint in joints
@@ -91,6 +91,12 @@ def remarks(model: Any) -> Iterator[str]:
                               for value in limit[joint.idx_v:joint.idx_v + joint.nv])]
         if without:
             yield f"{kind} limits of {some(without)}: none, or 0, which is no limit"
+    data = model.createData()
+    pin.computeSubtreeMasses(model, data)
+    light = [str(model.names[joint.id]) for joint in joints if not (
+        data.mass[joint.id] or model.armature[joint.idx_v:joint.idx_v + joint.nv].any())]
+    if light and any(data.mass):
+        yield f"masses beyond {some(light)}: none, so torques do not hold these joints"
     if names := ambiguous(model):
         yield (f"the frames called {some(names)}: each name is at two places, such as a joint and "
                "a link, so asking for it is an error")

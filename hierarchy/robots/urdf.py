@@ -21,6 +21,7 @@ _KINDS = ("revolute", "continuous", "prismatic", "fixed", "floating", "planar")
 _WITH_AXIS = ("revolute", "continuous", "prismatic", "planar")
 _WITH_LIMIT = ("revolute", "prismatic")
 _MOST = 5  # complaints that are told
+_LARGEST = 1e50  # of a mass, an inertia, a place or a size: their products are finite
 EXPAND = "expand macros first: xacro in.xacro > out.urdf"
 _EXPECTED = "expected a URDF (<robot>) or an MJCF (<mujoco>)"
 _OTHERS = {  # by root element, in small letters
@@ -174,6 +175,7 @@ def _of_joint(joint: Element, links: list[str], kinds: dict[str, str | None]) ->
     yield from _unread(joint, "limit", 1, lower="0", upper="0", velocity="0", effort="0")
     yield from _of_limit(joint, kind)
     yield from _unread(joint, "mimic", 1, multiplier="0", offset="0")
+    yield from _too_large(joint, "origin", "mimic")
     if joint.find("mimic") is not None:
         leader = attribute_of(joint, "mimic", "joint") or ""
         if leader == name_of(joint):
@@ -209,11 +211,20 @@ def _unread(parent: Element, tag: str, count: int, **defaults: str) -> Iterator[
                     if numbers_in(part.get(key, default), count) is None)
 
 
+def _too_large(element: Element, *paths: str) -> Iterator[str]:
+    """Yield the attributes of parts with a number with which the equations of motion overflow."""
+    for part in (part for path in paths for part in element.findall(path)):
+        yield from (f"its {part.tag} {key} = {value!r} is larger than {_LARGEST:g}"
+                    for key, value in part.items()
+                    if max(map(abs, numbers_in(value, len(value.split())) or [0.0])) > _LARGEST)
+
+
 def _of_link(link: Element) -> Iterator[str]:
     mass = attribute_of(link, "inertial/mass", "value")
     number = None if mass is None else numbers_in(mass, 1)
     if mass is not None and (number is None or number[0] < 0.0):
         yield f"its mass {mass!r} is not a number from 0 on"
+    yield from _too_large(link, "inertial/*", "collision/origin", "collision/geometry/*")
     for collision in link.findall("collision"):
         yield from _unread(collision, "origin", 3, xyz="0 0 0", rpy="0 0 0")
         for shape in collision.findall("geometry/*"):

@@ -28,7 +28,7 @@ _REACHED = 1e-6      # [m]
 _REACH_STEPS = 500   # damped Newton steps; a reachable point takes about ten
 _ON_LIMIT = 1e-9     # [rad or m] beyond a limit that is rounding
 _LONGEST_STEP = 0.3  # [rad] of any joint
-_CLOSED = 1e-3       # [m or rad] by which rounding in a file may leave a mechanism open
+CLOSED = 1e-3        # [m or rad] by which rounding in a file may leave a mechanism open
 _SINK = 2e-5         # [m] that on_floor presses a contact down: at 0 rounding decides if it carries
 _OFF = 0.002         # [m] of a point from the floor that is too far
 _TILTED = 1.0        # [deg] of a sole from the floor that is too much
@@ -129,7 +129,7 @@ def _state(robot: Robot, section: StartSection) -> State:
         q = mechanism.closed(robot.configuration(section.joints, q), section.joints)
         state = State.at(robot, q, section.v)
     gap, where = mechanism.gap(q)
-    if gap > _CLOSED:
+    if gap > CLOSED:
         raise ScenarioError(f"start: {where}: the robot's mechanism stays open by {gap:.3g} (m or "
                             "rad) there; give other start.joints")
     return state

@@ -179,10 +179,18 @@ def _joint_table(joints: list[dict[str, Any]]) -> list[str]:
 
 
 def _missing(robot: Robot) -> list[str]:
+    from hierarchy.tasks import Mechanism
+    from scenarios.cell.robot import CLOSED
+
+    mechanism = Mechanism(robot)
+    gap, where = mechanism.gap(mechanism.closed(robot.rest))
     alike = [joint for joint in _joints(robot) if joint["lower"] == joint["upper"]]
     said = [f"{kind} of {some(names)}" for kind, unlimited in (
         ("position limits", True), ("range between the position limits", False))
             if (names := [one["name"] for one in alike if (one["lower"] is None) == unlimited])]
+    if gap > CLOSED:
+        said.append(f"a posture near rest that closes the mechanism: {where}: it stays open by "
+                    f"{gap:.3g} (m or rad)")
     if not robot.masses.any():
         said.append("masses: centre-of-mass tasks and torque limits are not possible")
     if not robot.capsules:

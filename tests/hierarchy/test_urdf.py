@@ -121,6 +121,8 @@ def test_masses_and_shapes_on_a_planar_joint_are_where_the_file_has_them(load):
     ({"limit": '<limit lower="-1" upper="1" velocity="2"/>'}, "effort limits of only:"),
     ({"limit": LIMIT + '<safety_controller soft_upper_limit="0.5"/>'}, "soft limits of only:"),
     ({"kind": "continuous"}, "position limits of only: a continuous joint has none"),
+    ({"more": link("tip", "") + joint("last", "continuous", "arm", "tip", "")},
+     "masses beyond last: none, so torques do not hold these joints"),
     ({"more": link("only") + joint("x", "fixed", "base", "only", "", "")}, "frames called only:")])
 def test_what_a_robot_is_without_is_said(load, changed, said):
     given = {"arm": INERTIAL, "more": "", "root": "", "limit": LIMIT, "kind": "revolute",
