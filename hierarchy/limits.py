@@ -123,9 +123,10 @@ class Limits:
         """
         check_choice("limits: level", level, _LEVELS)
         command = np.atleast_1d(array_of("limits: x", x))
-        if not clamp_into_box(q, v, self.packed, level == "acceleration", command):
+        if command.ndim > 1 or not clamp_into_box(q, v, self.packed, level == "acceleration",
+                                                  command):
             raise HierarchyError(f"limits: {len(q)} positions, {len(v)} velocities and a command "
-                                 f"of {len(command)} for {self.packed.shape[1]} joints")
+                                 f"of shape {command.shape} for {self.packed.shape[1]} joints")
         return command
 
 

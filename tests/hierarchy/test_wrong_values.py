@@ -348,7 +348,7 @@ def limits(**settings):
     (lambda: ramping([3.0]), "contacts: state.carried has shape (1,), expected (2,)"),
     (lambda: LIMITS.limits.box(np.zeros(6), np.zeros(7), "velocity"), "7 finite numbers each"),
     (lambda: LIMITS.limits.clamp(np.zeros(7), np.zeros(7), "velocity", np.zeros(8)),
-     "7 positions, 7 velocities and a command of 8 for 7 joints"),
+     "7 positions, 7 velocities and a command of shape (8,) for 7 joints"),
     *((lambda task=task: Stack([HAND], "velocity", reference=task).hierarchy(STATE),
        f"{task.name!r}: the reference of a stack has a row for each joint")
       for task in (tasks.Position(FRAME, THERE), LIMITS, tasks.JointCoupling(
@@ -411,6 +411,8 @@ def limits(**settings):
         (lambda task: task.box(STATE, "speed"), "level = 'speed': expected one of 'velocity', 'ac"),
         (lambda task: task.clamp(STATE, "speed", A[0]), "level = 'speed': expected one of"),
         (lambda task: task.clamp(STATE, "velocity", "x"), "x is not an array of numbers: str 'x'"),
+        (lambda task: task.clamp(STATE, "velocity", [1.0]), "a command of shape (1,) for 7 joi"),
+        (lambda task: task.clamp(STATE, "velocity", A), "a command of shape (2, 2) for 7 joints"),
         (lambda task: task.clamp(STATE, "velocity", None), "is not an array of numbers: Non"))),
     (lambda: plugins.find("tasks", []), "plugins.find: name: expected a str, got list []"),
     (lambda: plugins.known("task"), "unknown group 'task'; did you mean 'tasks'?"),
