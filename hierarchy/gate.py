@@ -20,7 +20,8 @@ def array_of(what: str, value: Any) -> Array:
     """Return numbers as a new array; raises a HierarchyError for anything else."""
     try:
         given = np.asarray(value)
-        if given.dtype.kind in _NUMBERS and not np.ma.is_masked(value):
+        missing = given.dtype.kind == "O" and any(one is None for one in given.flat)
+        if given.dtype.kind in _NUMBERS and not missing and not np.ma.is_masked(value):
             return np.array(given, dtype=np.float64, order="C")
     except (TypeError, ValueError, OverflowError) as error:
         raise HierarchyError(f"{what} is not an array of numbers: {brief(value)}") from error
@@ -96,7 +97,8 @@ def level_names(names: Sequence[str] | None, count: int) -> tuple[str, ...]:
     """
     if names is None:
         return tuple(f"level {k + 1}" for k in range(count))
-    if not isinstance(names, str | tuple) and isinstance(names, Iterable):
+    if (not isinstance(names, str | tuple) and isinstance(names, Iterable)
+            and getattr(names, "shape", None) != ()):
         names = tuple(names)
     if not isinstance(names, tuple) or not all(isinstance(name, str) for name in names):
         raise HierarchyError(f"names: expected a list of texts, got {brief(names)}")

@@ -72,7 +72,7 @@ class Limits:
     `acceleration` (n,) [rad/s^2 or m/s^2] may not. A `horizon` [s] of at most a period changes
     nothing. The box is finite and never empty; see the module for what it guarantees. Raises
     HierarchyError, naming joint and value, if an entry is NaN, lower > upper, a rate or the period
-    is not positive, or the horizon is negative.
+    is not positive, their product too small or large, or the horizon is negative.
     """
 
     lower: Array
@@ -95,6 +95,9 @@ class Limits:
         _refuse(~((acceleration > 0.0) & (acceleration < np.inf)),
                 "acceleration must be positive and finite", acceleration)
         check_fields(self, "limits")
+        step = acceleration * self.period * self.period
+        _refuse(~((step >= 1.0 / _FAR) & (step <= _FAR)), "acceleration times period "
+                f"{self.period:g} s squared must be from {1.0 / _FAR:g} to {_FAR:g}", acceleration)
         times = [np.full(len(lower), time) for time in (self.period, self.horizon)]
         set_frozen(self, packed=np.array([*rows, *times]))
 
@@ -120,9 +123,10 @@ class Limits:
         """
         check_choice("limits: level", level, _LEVELS)
         command = np.atleast_1d(array_of("limits: x", x))
-        if not clamp_into_box(q, v, self.packed, level == "acceleration", command):
+        if command.ndim > 1 or not clamp_into_box(q, v, self.packed, level == "acceleration",
+                                                  command):
             raise HierarchyError(f"limits: {len(q)} positions, {len(v)} velocities and a command "
-                                 f"of {len(command)} for {self.packed.shape[1]} joints")
+                                 f"of shape {command.shape} for {self.packed.shape[1]} joints")
         return command
 
 

@@ -24,7 +24,7 @@ from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal, TypeVar, get_args
 
-from hierarchy.errors import HierarchyError, check_name, naming
+from hierarchy.errors import HierarchyError, check_name, expect, naming
 
 if TYPE_CHECKING:
     from importlib.metadata import EntryPoint
@@ -80,6 +80,7 @@ def known(group: Group) -> dict[str, Any]:
 
 def find(group: Group, name: str) -> Any | None:
     """Return what has a name in a group, or None; loads an entry point of that name."""
+    expect("plugins.find: name", name, str, "give a name")
     if name not in registered(group):
         for point in _points(group):
             if point.name == name:

@@ -160,7 +160,7 @@ class Robot:
         self.masses = np.array([0.0, *(float(inertia.mass) for inertia in inertias[1:])])
         self.centres = np.array([np.zeros(3), *(inertia.lever for inertia in inertias[1:])])
         found = found or Found(model, self.frame_names[-1], control_points=())
-        self.end_effector = end_effector or found.end_effector
+        self.end_effector = found.end_effector if end_effector is None else end_effector
         self.frame(self.end_effector, "end_effector frame")
         self.control_points = (points_along_chain(model, self.end_effector)
                                if found.control_points is None else found.control_points)
@@ -186,6 +186,7 @@ class Robot:
         `base` "fixed" or "floating" overrides that of its table.
         """
         expect("Robot.named: name", name, str, "give a name of ROBOTS")
+        _check_base(name, base)
         found = TABLES.get(name) or plugins.find("robots", name)
         if found is None:
             known = {*TABLES, *plugins.own("robots")}
@@ -217,6 +218,7 @@ class Robot:
         everything is the robot but bodies that only float beside it.
         """
         path = file_path("Robot.from_file: path", path)
+        _check_base(path, base)
         found = read_file(path, base, shapes, *_part(locked, root))
         return cls(found.model, Path(path).stem, end_effector, found)
 
@@ -233,8 +235,6 @@ class Robot:
         refuse(not isinstance(model, str | PathLike), "Robot.load: model: expected a name or a "
                f"file, got {brief(model)}", RobotError)
         model = str(model)
-        refuse(base is not None and not is_one_of(base, get_args(Base)), f"robot {model!r}: base "
-               f"must be one of {get_args(Base)}, got {base!r}", RobotError)
         if in_package(model):
             robot = cls.from_file(file_of(model), end_effector, base, locked=locked, root=root)
             robot.name = model.partition(":")[2]
@@ -463,6 +463,11 @@ class Robot:
 
     def __repr__(self) -> str:
         return f"Robot({self.name!r}, n={self.n})"
+
+
+def _check_base(model: str | Path, base: object) -> None:
+    refuse(base is not None and not is_one_of(base, get_args(Base)), f"robot {str(model)!r}: base "
+           f"must be one of {get_args(Base)}, got {base!r}", RobotError)
 
 
 def _part(locked: object, root: object) -> tuple[Mapping[str, ArrayLike], Sequence[str]]:

@@ -33,6 +33,7 @@ from hierarchy.records import NotNegative, Positive, Vector3, check_fields, set_
 
 Vector = Sequence[float]
 _NUMBER = "+-.0123456789"  # how one may begin
+_BRIEFEST = 1e-100         # [s] blend, of which powers must not underflow
 
 
 class Path(ABC):
@@ -262,8 +263,8 @@ class Blended(_Pieces):
         times, points = _checked("blended waypoints", self.times, self.points)
         shortest = min(np.diff(times), default=inf)
         T = number("blended waypoints: blend [s]", self.blend)
-        refuse(not 0.0 < T <= shortest, f"blended waypoints: blend {T} s must be positive "
-               f"and at most {shortest:g} s, the shortest interval")
+        refuse(not _BRIEFEST <= T <= shortest, f"blended waypoints: blend {T} s must be at least "
+               f"{_BRIEFEST:g} s, and at most {shortest:g} s, the shortest interval")
         spans = np.diff(times, append=times[-1] + T + 1.0)[:, None]
         after = np.diff(points, axis=0, append=points[-1:]) / spans
         before, none = np.vstack([np.zeros(3), after[:-1]]), np.zeros_like(points)

@@ -3,11 +3,11 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import partial
-from typing import Annotated, Literal
+from typing import Annotated, Literal, cast
 
 from hierarchy.errors import brief, expect, expect_each, finite_numbers, number, real, refuse
 from hierarchy.gate import array_of, direction
-from hierarchy.records import NotNegative, check_fields
+from hierarchy.records import Check, NotNegative, check_fields
 
 
 def _limit(what: str, value: object) -> float:
@@ -23,11 +23,21 @@ def _limits(what: str, values: object) -> None:
         _limit(f"{what}[{i}]", value)
 
 
+def _pairs(what: str, values: object, of_joint: Check, remedy: str) -> None:
+    expect(what, values, Sequence, remedy)
+    for i, pair in enumerate(cast("Sequence[object]", values)):
+        refuse(not isinstance(pair, tuple | list) or len(pair) != 2 or type(pair[0]) is not str,
+               f"{what}[{i}]: expected a pair, got {brief(pair)}; {remedy}")
+        of_joint(f"{what}[{i}]", cast("Sequence[object]", pair)[1])
+
+
 Base = Literal["fixed", "floating"]
 Name = Annotated[str, partial(expect, kind=str, remedy="give a name")]
 Vector = Annotated[tuple[float, float, float], partial(finite_numbers, size=3)]
 Numbers = Annotated[tuple[float, ...], finite_numbers]
 Limits = Annotated[tuple[float, ...], _limits]
+ControlPoints = Annotated[tuple[tuple[str, Vector], ...], partial(
+    _pairs, of_joint=partial(finite_numbers, size=3), remedy="give (joint, offset)")]
 
 
 @dataclass(frozen=True)
@@ -49,12 +59,10 @@ class DHTable:
     effort: Limits
     mass: Numbers
     radius: NotNegative
-    control_points: tuple[tuple[str, Vector], ...]
+    control_points: ControlPoints
 
     def __post_init__(self) -> None:
         check_fields(self, f"table {self.name!r}")
-        expect_each(f"table {self.name!r}: control_points", self.control_points, Sequence,
-                    "give (joint, offset)")
         for name in ("a", "alpha", "range", "velocity", "effort", "mass"):
             refuse(len(getattr(self, name)) != len(self.d), f"table {self.name!r}: {name} has "
                    f"{len(getattr(self, name))} entries, and d {len(self.d)}, one for each joint")
@@ -132,8 +140,10 @@ class TreeTable:
     joints: tuple[TreeJoint, ...]
     frames: tuple[TreeFrame, ...]
     end_effector: Name
-    links: tuple[tuple[str, Link], ...] = ()
-    control_points: tuple[tuple[str, Vector], ...] = ()
+    links: Annotated[tuple[tuple[str, Link], ...], partial(
+        _pairs, of_joint=partial(expect, kind=Link, remedy="give a Link"),
+        remedy="give (joint, link)")] = ()
+    control_points: ControlPoints = ()
     base: Base = "fixed"
     base_height: Annotated[float, number] = 0.0
 
@@ -142,9 +152,6 @@ class TreeTable:
         check_fields(self, what)
         expect_each(f"{what}: joints", self.joints, TreeJoint, "give TreeJoint(...)")
         expect_each(f"{what}: frames", self.frames, TreeFrame, "give TreeFrame(...)")
-        expect_each(f"{what}: links", self.links, Sequence, "give (joint, link)")
-        expect_each(f"{what}: control_points", self.control_points, Sequence,
-                    "give (joint, offset)")
 
 
 Table = DHTable | TreeTable

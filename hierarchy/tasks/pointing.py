@@ -99,6 +99,7 @@ class Pointing(Measured):
         return _pointing, (self.frame.joint, self.z_e, self.z_d, self.cos_alpha_d)
 
 
+_FAR = 1e100    # [m] at which a farther target stands, so that no square overflows
 _NEAR = 1e-6    # [m] from the target, where no direction leads to it
 _BEHIND = 1e-6  # 1 + u_z of a target straight behind, where every way round is as long
 _ASIDE = (1e-3, 0.0, -(1.0 - 1e-6) ** 0.5)
@@ -136,7 +137,9 @@ def _look_at(kinematics, reads, goal, J, motion):
     y is the target in the frame's axes, r its distance, and d the vector to it in world axes.
     """
     frame, point = reads
-    d = less(point, place(kinematics.placements[frame.joint], frame.offset))
+    beyond = max(abs(point[0]), abs(point[1]), abs(point[2])) / _FAR
+    d = less(times(1.0 / max(beyond, 1.0), point),
+             place(kinematics.placements[frame.joint], frame.offset))
     R = rotation_of(kinematics.placements, frame)
     y = turned_back(R, d)
     r = max(np.sqrt(dot(y, y)), _NEAR)

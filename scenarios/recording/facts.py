@@ -85,6 +85,12 @@ class RobotFacts:
         return 6 if self.base == "floating" else 0
 
     @property
+    def joint_units(self) -> dict[str, str]:
+        """The unit along each velocity of a joint, by its name; not of a floating base."""
+        return dict(zip(self.velocity_names[self.actuated:], self.velocity_units[self.actuated:],
+                        strict=True))
+
+    @property
     def effort_units(self) -> tuple[str, ...]:
         """The unit of the effort along each velocity (n,)."""
         return tuple("N" if unit == "m" else "N m" for unit in self.velocity_units)

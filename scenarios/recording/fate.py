@@ -1,6 +1,6 @@
 """The fate of each level under the command that was sent: its rows are met, inactive or missed."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from enum import IntEnum
 
@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from hierarchy.problem import Array
 from scenarios.config import Scenario
+from scenarios.config.sections.tasks import JOINT, shared
 from scenarios.recording.recording import Recording
 
 
@@ -24,14 +25,15 @@ class Fate(IntEnum):
 
 PHRASES = {Fate.MET: "row met", Fate.FREE: "row inactive", Fate.MISSED: "row missed",
            Fate.UNKNOWN: "in the stack, not judged", Fate.ABSENT: "not in the stack"}
-_UNITS = {"position": "m", "avoidance": "m", "separation": "m", "joint limits": "rad",
-          "posture": "rad"}  # of the errors of tasks that no section lists
+_UNITS = {"position": "m", "avoidance": "m", "separation": "m", "joint limits": JOINT,
+          "posture": JOINT}  # of the errors of tasks that no section lists
 
 
-def row_units(scenario: Scenario, names: Sequence[str], joints: Sequence[str]) -> tuple[str, ...]:
+def row_units(scenario: Scenario, names: Sequence[str], joints: Mapping[str, str]
+              ) -> tuple[str, ...]:
     """Return the unit of the rows of each task, "" where they differ or it is not known.
 
-    `joints` are the units of the joints, which a task in "rad" has.
+    `joints` are the units of the joints, by name.
     """
     sections = {task.title: task for task in scenario.tasks}
     rate = "/s" if scenario.control.level == "velocity" else "/s²"
@@ -40,11 +42,11 @@ def row_units(scenario: Scenario, names: Sequence[str], joints: Sequence[str]) -
         section = sections.get(name)
         if section and section.of_forces:
             return section.unit
-        of_error = section.unit if section else _UNITS.get(name, "")
+        of_error = section.unit_among(joints) if section else _UNITS.get(name, "")
         if of_error.endswith(" s"):  # a momentum, whose rate is a force
             return of_error.removesuffix(" s")
-        if of_error == "rad":
-            of_error = joints[0] if len({*joints}) == 1 else ""
+        if of_error == JOINT:
+            of_error = shared(joints.values())
         return "" if hasattr(section, "rotation") or not of_error else of_error + rate
 
     return tuple(unit(name) for name in names)
@@ -74,7 +76,6 @@ def levels_at(recording: Recording, ticks: Sequence[int] | NDArray[np.int64]) ->
     unknown = {"level_fate": np.int8(Fate.UNKNOWN) * recording.in_stack,
                "level_violation": np.full((recording.ticks, len(names)), np.nan),
                "saturated": np.zeros(recording["v"].shape, np.int8)}
-    robot = recording.facts.robot
-    units = row_units(recording.scenario, names, robot.velocity_units[robot.actuated:])
+    units = row_units(recording.scenario, names, recording.facts.robot.joint_units)
     return Levels(names, units, *(recording.get(name, none)[ticks]
                                   for name, none in unknown.items()))

@@ -9,7 +9,7 @@ from hierarchy import Robot, State, Task
 from hierarchy.problem import Array
 from hierarchy.tasks import Along, CentreOfMass, Position
 from hierarchy.tasks.pose import Pose
-from scenarios.config.sections.tasks import ListedTask
+from scenarios.config.sections.tasks import JOINT, ListedTask
 from scenarios.recording.recording import Recording
 
 
@@ -69,7 +69,8 @@ def errors(recording: Recording) -> Iterator[tuple[ListedTask, str, Array]]:
     A pose or frame comes twice, in [m] and [deg]; a pointing task in [deg], off its cone or outside
     it; a task that looks at a point in [deg].
     """
+    units = recording.facts.robot.joint_units
     for section in recording.scenario.tasks:
         if error_of(section.title) in recording:
             for unit, size in section.sizes(recording[error_of(section.title)]):
-                yield section, unit, size
+                yield section, section.unit_among(units) if unit == JOINT else unit, size

@@ -161,6 +161,16 @@ def test_a_task_made_of_others_has_the_feedforward_of_their_paths():
         np.testing.assert_allclose(getattr(both, wanted)(state), [*found, *np.zeros(7)])
 
 
+def test_a_target_however_far_is_looked_at_as_a_direction():
+    """Squares of its position overflowed: the error was zero, and the rows NaN."""
+    near, far = (tasks.LookAt(FRAME, (size, -size, 0.3)) for size in (1e50, 1e300))
+    state = state_at(Q, V)
+    np.testing.assert_allclose(far.error(state), near.error(state))
+    for rows in ("jacobian", "jacobian_derivative"):
+        np.testing.assert_allclose(getattr(far, rows)(state), getattr(near, rows)(state),
+                                   atol=1e-12)
+
+
 @pytest.mark.parametrize(("kind", "given", "other"), [
     (tasks.LookAt, {"target": np.array([0.3, 0.5, 0.1])}, [0.1, -0.4, 0.2]),
     (tasks.Pose, {"path": PATH, "rotation": np.eye(3)}, np.diag([1.0, -1.0, -1.0])),

@@ -45,9 +45,9 @@ NAN, INF = float("nan"), float("inf")
 A, B = np.eye(2), np.ones(2)
 FOOT, PALM = (HUMANOID.frame(f"left_{name}") for name in ("foot", "hand"))
 STATE = State.at(ROBOT, [0.9, -0.85, 0.9, 1.2, 0.97, 1.8, 0.0])
+URDF = Path(__file__).parents[2] / "examples/robots/iiwa14.urdf"
 BARE, PANDA = (State.at(robot, robot.rest) for robot in (
-    Robot.load(Path(__file__).parents[2] / f"examples/robots/{name}.urdf")
-    for name in ("so101", "panda")))
+    Robot.load(URDF.with_stem(name)) for name in ("so101", "panda")))
 THERE = Still([0.3, 0.5, 0.1])
 HAND = tasks.Position(FRAME, THERE)
 LIMITS, POINTS = tasks.JointLimits(ROBOT, 10.0, 0.01), ROBOT.control_points
@@ -173,6 +173,8 @@ def limits(**settings):
     (lambda: tasks.model_rows(ROBOT, 0.0), "period [s] = 0: expected a number > 0"),
     (lambda: Stack([HAND], A), "level must be 'velocity'"),
     (lambda: Stack([HAND], give=0.1), "give of a stack: expected a Mapping, got float 0.1"),
+    (lambda: Hierarchy.from_levels([(A, [None, 1])]), "b is not an array of numbers: list [None"),
+    (lambda: Hierarchy.from_levels([(A, B)], names=np.array(1.0)), "expected a list of texts, got"),
     (lambda: Hierarchy.from_levels([(A, B)], names=3), "names: expected a list of texts, got int"),
     (lambda: Hierarchy.from_levels([(A, B)], give=0.1), "give: expected a Sized, got float 0.1"),
     (lambda: Hierarchy.from_levels([(A, B)]).relaxed(0, B), "no level of the hierarchy gives"),
@@ -186,6 +188,9 @@ def limits(**settings):
     (lambda: ROBOT.joint(B), "unknown joint"),
     (lambda: ROBOT.frame(B), "unknown frame"),
     (lambda: Robot.load("kuka_lwr", base=B), "base must be one of"),
+    (lambda: Robot.named("kuka_lwr", base=B), "robot 'kuka_lwr': base must be one of"),
+    (lambda: Robot.from_file(URDF, base="flying"), "iiwa14.urdf': base must be one of"),
+    (lambda: Robot.from_file(URDF, end_effector=B), "unknown end_effector frame array("),
     (lambda: Frame("tcp", 7, [0, 0, 0.1, 1], A), "'tcp': rotation: expected a rotation matrix"),
     (lambda: Frame("tcp", 7, [0, NAN, 0.1], np.eye(3)), "'tcp': offset: expected 3 finite numb"),
     (lambda: Frame("tcp", 1, [0, 0, 0.1], np.eye(3), 1), "'tcp': of: expected a str, got int 1"),
@@ -282,6 +287,9 @@ def limits(**settings):
     (lambda: tasks.CentreOfMass(ROBOT, THERE, (0, 3)), "must be some of 0, 1, 2"),
     (lambda: tasks.JointCoupling(ROBOT, {"joint_1": 0.0}), "no factor other than zero"),
     (lambda: tasks.Manipulability(FRAME, -0.1), "least = -0.1"),
+    (lambda: limits(acceleration=1e-300), "limits[0]: acceleration times period 0.001 s squared "),
+    (lambda: limits(period=1e-300), "squared must be from 1e-100 to 1e+100, got 10.0"),
+    (lambda: limits(period=1e100, acceleration=1.0), "acceleration times period 1e+100 s squared"),
     (lambda: limits(acceleration=0.0), "limits[0]: acceleration must be positive and finite, got"),
     (lambda: limits(acceleration=[1.0, 2.0]), "has shape (2,), expected a number or (7,)"),
     (lambda: limits(margin=2.2), "margin 2.2 leaves joint_2 no room between -2.094 and 2.094"),
@@ -293,7 +301,8 @@ def limits(**settings):
        f"fraction = {fraction:g}: expected a finite number from 0 to 1")
       for fraction in (-1.0, 80.0)),
     (lambda: tasks.TorqueLimits(ROBOT, 0.0), "fraction 0.0 is not more than 0"),
-    (lambda: Blended(TIMES, CORNERS, 0.0), "blend 0.0 s must be positive"),
+    (lambda: Blended(TIMES, CORNERS, 0.0), "blend 0.0 s must be at least 1e-100 s"),
+    (lambda: Blended(TIMES, CORNERS, 1e-300), "blend 1e-300 s must be at least 1e-100 s"),
     (lambda: Blended(TIMES[:1], CORNERS, 0.1), "1 times for 2 points"),
     *((lambda bad=bad: Jittered(THERE, **{"amplitude": 0.1, "rate": 1.0, "seed": 0} | bad),
        f"jitter: {next(iter(bad))}")
@@ -339,7 +348,7 @@ def limits(**settings):
     (lambda: ramping([3.0]), "contacts: state.carried has shape (1,), expected (2,)"),
     (lambda: LIMITS.limits.box(np.zeros(6), np.zeros(7), "velocity"), "7 finite numbers each"),
     (lambda: LIMITS.limits.clamp(np.zeros(7), np.zeros(7), "velocity", np.zeros(8)),
-     "7 positions, 7 velocities and a command of 8 for 7 joints"),
+     "7 positions, 7 velocities and a command of shape (8,) for 7 joints"),
     *((lambda task=task: Stack([HAND], "velocity", reference=task).hierarchy(STATE),
        f"{task.name!r}: the reference of a stack has a row for each joint")
       for task in (tasks.Position(FRAME, THERE), LIMITS, tasks.JointCoupling(
@@ -378,13 +387,18 @@ def limits(**settings):
     (lambda: replace(TABLES["kuka_lwr"], a=(0.0,)), "'kuka_lwr': a has 1 entries, and d 7, one"),
     (lambda: replace(TABLES["kuka_lwr"], effort=(-1.0,) * 7), "effort[0] = -1: expected a number"),
     (lambda: replace(TABLES["kuka_lwr"], mass=(NAN,) * 7), "mass: expected finite numbers, got"),
+    *((lambda points=points: replace(TABLES["kuka_lwr"], control_points=points), said)
+      for points, said in (("x", "control_points[0]: expected a pair, got str 'x'; give (joint, o"),
+                           ([("a", [1, 2])], "control_points[0]: expected 3 finite numbers, got"))),
     *((lambda kind=kind, wrong=wrong: kind(**wrong), said) for kind, wrong, said in (
         (Link, {"mass": -1.0}, "link: mass = -1: expected a finite number from 0 on"),
         (Link, {"end": None}, "link: end: expected 3 finite numbers, got NoneType None"),
         (TreeFrame, {"name": "f", "joint": "", "offset": (0, 0, 0), "z_axis": (0, 0, 0)},
          "frame 'f': z_axis: tuple (0, 0, 0) is no direction"),
         (TreeTable, {"name": "t", "joints": ("a",), "frames": (), "end_effector": "a"},
-         "table 't': joints[0]: expected a TreeJoint, got str 'a'"))),
+         "table 't': joints[0]: expected a TreeJoint, got str 'a'"),
+        (TreeTable, {"name": "t", "joints": (), "frames": (), "end_effector": "a",
+                     "links": [("", 9)]}, "'t': links[0]: expected a Link, got int 9"))),
     *((lambda wrong=wrong: replace(TABLES["quadruped"].joints[0], name="j", **wrong), said)
       for wrong, said in (({"axis": "w"}, "joint 'j': axis = 'w': expected one of 'x', 'y', 'z'"),
                           ({"range": (1, -1)}, "range: expected (lower, upper), got tuple (1, -1)"),
@@ -397,7 +411,10 @@ def limits(**settings):
         (lambda task: task.box(STATE, "speed"), "level = 'speed': expected one of 'velocity', 'ac"),
         (lambda task: task.clamp(STATE, "speed", A[0]), "level = 'speed': expected one of"),
         (lambda task: task.clamp(STATE, "velocity", "x"), "x is not an array of numbers: str 'x'"),
-        (lambda task: task.clamp(STATE, "velocity", None), "and a command of 1 for 7 joints"))),
+        (lambda task: task.clamp(STATE, "velocity", [1.0]), "a command of shape (1,) for 7 joi"),
+        (lambda task: task.clamp(STATE, "velocity", A), "a command of shape (2, 2) for 7 joints"),
+        (lambda task: task.clamp(STATE, "velocity", None), "is not an array of numbers: Non"))),
+    (lambda: plugins.find("tasks", []), "plugins.find: name: expected a str, got list []"),
     (lambda: plugins.known("task"), "unknown group 'task'; did you mean 'tasks'?"),
     (lambda: Pairs(-1, 2), "pairs: points = -1: expected a whole number from 0 on"),
     (lambda: measure_pairs(None, B, Obstacles()), "measure_pairs: pairs: expected a Pairs, got No"),

@@ -13,6 +13,7 @@ from scenarios.draw.viewer.live import Live
 from scenarios.loop.controller import Controller
 from scenarios.measure.judging import judge
 from scenarios.recording.fate import Fate, levels_at, row_units
+from scenarios.recording.listed import errors
 from scenarios.scene.drawn import scene
 
 
@@ -49,23 +50,31 @@ def test_a_cone_and_a_direction_have_no_unit():
              {"kind": "pointing", "frame": "tool", "axis": [0.0, 0.0, 1.0], "alpha_d": 20.0}]
     scenario = load("ellipse-hqp", {"tasks": tasks, "pointing": None})
     names = ["look-at", "pointing", "position"]
-    assert row_units(scenario, names, ["rad"]) == ("", "", "m/s²")
+    assert row_units(scenario, names, {}) == ("", "", "m/s²")
 
 
-def test_levels_of_joints_have_their_unit_and_none_where_those_differ():
-    """Limits and postures of joints that slide were said to be missed by so many rad/s²."""
-    run = simulate(load("ellipse-limits", {"control.duration": 0.002}))
-    assert "joint limits" in run.task_names
-    for units, said in ((["rad"] * 7, "rad/s²"), (["m"] * 7, "m/s²"), (["m"] * 6 + ["rad"], "")):
-        robot = replace(run.facts.robot, velocity_units=tuple(units))
-        levels = levels_at(replace(run, facts=replace(run.facts, robot=robot)), [0])
-        assert levels.units[levels.names.index("joint limits")] == said
+@pytest.mark.parametrize(("units", "all_of_them", "two"), [
+    (["rad"] * 7, "rad", "rad"), (["m"] * 7, "m", "m"), (["m"] * 6 + ["rad"], "", "m")])
+def test_tasks_of_joints_have_their_unit_and_none_where_those_differ(units, all_of_them, two):
+    """Those of joints that slide were said to be missed by so many rad/s², and off by rad."""
+    tasks = [{"kind": "coupling", "joints": {"joint_1": 1.0, "joint_2": 1.0}},
+             {"kind": "posture"}]
+    run = simulate(load("ellipse-hqp", {"control.duration": 0.002, "tasks": tasks}))
+    robot = replace(run.facts.robot, velocity_units=tuple(units))
+    run = replace(run, facts=replace(run.facts, robot=robot))
+    levels = levels_at(run, [0])
+    said = dict(zip(levels.names, levels.units, strict=True))
+    expected = {"joint limits": all_of_them, "coupling": two, "posture": all_of_them}
+    assert {name: said[name] for name in expected} == {
+        name: unit and f"{unit}/s²" for name, unit in expected.items()}
+    del expected["joint limits"]
+    assert {section.title: unit for section, unit, _ in errors(run)} == expected
 
 
 def test_a_wrench_has_no_unit():
     for target, unit in (([20.0], "N"), ([20.0] * 3, "N"), ([20.0] * 6, "")):
         scenario = load("wipe", {"tasks.0.target": target})
-        assert row_units(scenario, ["force"], ["rad"]) == (unit,)
+        assert row_units(scenario, ["force"], {}) == (unit,)
 
 
 NAMES = ("ellipse", "ellipse-velocity", "ellipse-published", "ellipse-limits", "ellipse-hqp")

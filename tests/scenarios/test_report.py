@@ -195,6 +195,23 @@ def test_a_joint_has_one_colour_in_a_figure_of_two_runs():
     assert len(first) == 8
 
 
+def test_a_joint_whose_name_begins_with_an_underscore_is_in_the_legend():
+    """matplotlib leaves such labels out of its own."""
+    run = recording()
+    robot = dataclasses.replace(run.facts.robot, velocity_names=tuple(f"_{i}" for i in range(7)))
+    run = dataclasses.replace(run, facts=dataclasses.replace(run.facts, robot=robot))
+    fig = letter.stacked([(run, [letter.PANEL["joint-velocities"]])], "")
+    assert [text.get_text() for text in fig.legends[0].texts] == [*robot.velocity_names]
+
+
+def test_a_run_of_one_tick_makes_no_figures_which_is_said(tmp_path, command):
+    """An empty line was."""
+    run_folder = save(recording(t=[0.0]), tmp_path / "run")
+    told = command("figures", run_folder, "--out", tmp_path / "figures")
+    assert told.out == ""
+    assert "nothing to draw" in told.err
+
+
 def test_a_picture_links_the_body_with_the_surface_and_shows_where_listed_tasks_are_to_go(
         tmp_path):
     scenario = load("wipe", {"control.duration": 0.02, "avoidance": {

@@ -5,7 +5,7 @@ Makers import what they make when they are called, so that reading a file loads 
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal
 
 import numpy as np
@@ -187,11 +187,15 @@ class ListedPosture(base.Listed, base.PostureTask):
 class ListedCoupling(base.Listed, base.TaskSection):
     """A weighted sum of joint positions (1 row)."""
 
-    unit: ClassVar[str] = "rad"
+    unit: ClassVar[str] = base.JOINT
     made_by: ClassVar[str] = "hierarchy.tasks:JointCoupling"
     joints: Annotated[dict[str, keys.Finite], Field(min_length=1)]  #: Factors of joints, by name.
     value: keys.JointPosition = 0.0  #: The value of the sum.
     stiffness: keys.Stiffness = 100.0
+
+    def unit_among(self, joints: Mapping[str, str]) -> str:
+        """Return the unit of the joints of the sum, "" where they have two."""
+        return base.shared(joints[name] for name in self.joints)
 
 
 @register("tasks", "com", shipped=True)

@@ -5,7 +5,7 @@ Each section of a task makes it; `kinds` has those that only `[[tasks]]` have.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from math import radians
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal
 
@@ -28,12 +28,19 @@ if TYPE_CHECKING:
 Acceleration = Annotated[keys.Positive, keys.Unit("rad/s^2")]
 Rows = Literal["equality", "inequality"]
 Axes = Literal["x", "y", "z", "xy", "xz", "yz", "xyz"]
+JOINT = "joint"  # stands for the unit of joints
+
+
+def shared(units: Iterable[str]) -> str:
+    """Return the unit that all of them are, "" where there are several."""
+    found = {*units}
+    return found.pop() if len(found) == 1 else ""
 
 
 class Made(PartSection):
     """What every section of a task has: a title, and the task that it makes.
 
-    `unit` is that of its error, "m", "rad" or "", and `shown` has the rows that are shown in
+    `unit` is that of its error, see `unit_among`, and `shown` has the rows that are shown in
     another one; `of_forces` says that its rows are over contact forces, at level "torque".
     """
 
@@ -57,6 +64,10 @@ class Made(PartSection):
     def asked(self, at: References) -> dict[str, Any]:
         """Return what the maker takes that is no key, or that the section leaves to the start."""
         return {}
+
+    def unit_among(self, joints: Mapping[str, str]) -> str:
+        """Return the unit of its error on a robot whose joints have these units, by name."""
+        return self.unit
 
     def sizes(self, error: Array) -> Iterator[tuple[str, Array]]:
         """Yield unit and size (T,) of the errors (T, m) of the task, or of each part of them."""
@@ -173,13 +184,17 @@ class PostureTask(TaskSection):
     """All joints to a posture."""
 
     made_by: ClassVar[str] = "hierarchy.tasks:Posture"
-    unit: ClassVar[str] = "rad"
+    unit: ClassVar[str] = JOINT
     target: tuple[keys.JointPosition, ...] | None = None  #: As `start.q`; by default the start.
     joints: dict[str, keys.JointValue] = Field(default_factory=dict)
     """Positions by name, which override `target`."""
     stiffness: keys.Stiffness = 10.0
     damping: keys.Gain = 5.0
     gain: keys.Gain = 1.0
+
+    def unit_among(self, joints: Mapping[str, str]) -> str:
+        """Return the unit of all joints, "" where they have two."""
+        return shared(joints.values())
 
     def asked(self, at: References) -> dict[str, Any]:
         """Return the posture, by default that of the start."""

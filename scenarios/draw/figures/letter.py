@@ -191,8 +191,10 @@ def stacked(parts: Sequence[tuple[Recording, Sequence[Panel]]], title: str,
         which = f", {_run_of(run)}" if drawing.present().titled and letter and len(runs) > 1 else ""
         ax.set_title(f"{letter}{panel.heading}{which}", loc="left")
         before = i
-    lines = {label: line for ax in axes
-             for line, label in zip(*ax.get_legend_handles_labels(), strict=True)}
+    joints = {name for run, _ in parts for name in run.facts.robot.speed_names}  # also of "_a"
+    lines = {label: line for ax in axes for line, label in (
+        *zip(*ax.get_legend_handles_labels(), strict=True),
+        *((line, str(line.get_label())) for line in ax.lines if line.get_label() in joints))}
     if lines:
         wide = drawing.present().titled and max(map(len, lines)) <= _SHORT
         fig.legend(list(lines.values()), list(lines), fontsize="small", frameon=False,
