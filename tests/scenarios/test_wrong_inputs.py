@@ -157,6 +157,7 @@ H = Hierarchy.from_levels([([[1.0, 0.0]], [-0.1], [0.1]), ([[1.0, 0.5]], [0.3])]
     (lambda: simulate(SHORT, audits=3), "simulate: audits: expected an Iterable, got int 3"),
     (lambda: simulate("elipse"), "unknown scenario 'elipse'; did you mean 'ellipse'?"),
     (lambda: compare(3), "compare: expected names, files, or what `load` returns, got int 3"),
+    (lambda: compare([]), "no scenario was given"),
     (lambda: compare("ellipse", "hcod"), "resolvers: expected a list of names, got str 'hcod'"),
     (lambda: compare(SHORT, ["tpm"], out=3), "compare: out: expected a path, got int 3"),
     (lambda: save("ellipse", "x"), "save: expected a Recording, got str 'ellipse'"),
