@@ -81,7 +81,7 @@ def _run(scenario: Scenario, folder: Path, certify: bool, figures: bool, as_json
                              progress=partial(told, str(scenario.make_resolver().label)))
     if lost := kept(recording, folder):
         return exit_code(lost)
-    if figures:
+    if figures and recording.ticks > 1:
         from scenarios.draw.figures.letter import redraw
 
         redraw([folder])

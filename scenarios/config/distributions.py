@@ -82,12 +82,16 @@ _KEYS = tuple(Distribution.model_fields)
 
 
 def flat(table: Any, above: str = "") -> Any:
-    """Flatten nested tables, which TOML makes of dotted keys, to one level."""
+    """Flatten nested tables, which TOML makes of dotted keys, to one level.
+
+    A table in a section that has no table in it is a distribution, whatever its keys.
+    """
     if not isinstance(table, dict):
         return table
     found: dict[str, Any] = {}
     for key, value in table.items():
-        if isinstance(value, dict) and value and not any(key in _KEYS for key in value):
+        if isinstance(value, dict) and value and not any(key in _KEYS for key in value) and (
+                not above or any(isinstance(one, dict) for one in value.values())):
             found |= flat(value, f"{above}{key}.")
         else:
             found[f"{above}{key}"] = value

@@ -117,7 +117,8 @@ def _table(data: Any, path: Sequence[int | str]) -> dict[str, Any]:
 def _annotations(root: type[Section], path: Sequence[str]) -> list[Any]:
     """Return the annotations of the keys at a path, in all sections that it may lead through."""
     parts: list[Any] = [root]
-    for key in (key for key in path if not key.isdigit() and key != "*"):  # of a list
+    # Numbers and * are of a list, a key with dots is of [variation].
+    for key in (key for key in path if not key.isdigit() and key != "*" and "." not in key):
         parts = [(field.annotation, *field.metadata) for part in parts
                  for section in parts_of(part, Section) for name, field
                  in section.model_fields.items() if key in (name, field.alias)]

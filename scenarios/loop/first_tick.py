@@ -128,3 +128,7 @@ def _warnings(scenario: Scenario, distances: dict[str, float]) -> Iterator[str]:
                 yield (f"{name}: {1e3 * distances[name]:.0f} mm from the nearest obstacle at the "
                        f"start, less than the {1e3 * kept[key]:.0f} mm to be kept")
     yield from doubtful_units(scenario)
+    end, pushes = scenario.control.duration, getattr(scenario.plant, "pushes", ())
+    for key, events in (("faults", scenario.faults), ("plant.pushes", pushes)):
+        yield from (f"{key}.{i}.at = {one.at:g} s is after the run, which ends at {end:g} s"
+                    for i, one in enumerate(events) if one.at >= end)

@@ -172,5 +172,7 @@ def _goal(name: str, asked: str, unit: str, off: Array, promise: bool, t: Array)
 
 
 def percent(share: float) -> str:
-    """Return a share as it stands in a sentence."""
-    return f"{100.0 * share:.2g} %" if share < 0.995 else f"{100.0 * share:.0f} %"
+    """Return a share as it stands in a sentence; only a whole one is 100 %."""
+    if share == 1.0:
+        return "100 %"
+    return f"{100.0 * share:.2g} %" if share < 0.995 else f"{min(100.0 * share, 99.9):.1f} %"

@@ -80,8 +80,10 @@ def family(name: str) -> Family:
 def _reference(name: str, seed: int, count: int) -> list[Hierarchy]:
     """Return stored problems, or new ones of the same make."""
     first = seed if name in recorded.RECORDED else seed * _STRIDE
-    found = recorded.fresh(name, first, count) if seed else recorded.family(name)[:count]
-    return [one.h for one in found]
+    found = recorded.fresh(name, first, count) if seed else recorded.family(name)
+    refuse(count > len(found), f"family {name!r}: its public set has {len(found)} problems, not "
+           f"{count}; a seed makes as many fresh ones as asked")
+    return [one.h for one in found[:count]]
 
 
 def _other(name: str, seed: int, count: int) -> list[Hierarchy]:

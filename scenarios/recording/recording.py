@@ -117,10 +117,10 @@ class Recording:
         axes = figure.subplots(len(asked), 1, sharex=True, squeeze=False)[:, 0]
         units = self.units()
         for ax, name in zip(axes, asked, strict=True):
-            lines = ax.plot(self["t"], drawn[name].reshape(self.ticks, -1), linewidth=0.9)
+            lines = {f"{name}{index}": ax.plot(self["t"], values, linewidth=0.9)[0]
+                     for index, values in _entries(drawn[name])}
             if 1 < len(lines) <= _LABELLED:
-                ax.legend(lines, [f"{name}{index}" for index, _ in _entries(drawn[name])],
-                          fontsize="x-small", ncols=2, loc="upper right")
+                ax.legend(lines.values(), lines, fontsize="x-small", ncols=2, loc="upper right")
             shown = ", ".join(dict.fromkeys(units.get(name, ())))
             ax.set_ylabel(f"{name} [{shown}]" if shown else name)
         axes[-1].set_xlabel("t [s]")

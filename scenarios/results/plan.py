@@ -272,7 +272,8 @@ def side_by_side(scenarios: Sequence[Scenario], specs: Sequence[str] | None, wha
         runs += [Run(one, spec, spec if shared[labels[spec]] > 1 else labels[spec])
                  for spec, one in can.items()]
         refused += cannot
-    refuse(not runs, "; ".join(refused) or "no resolver was given")
+    refuse(not scenarios, f"{what}no scenario was given")
+    refuse(not runs, "; ".join(refused) or f"{what}no resolver was given")
     if len(runs) > 1 and len({run.spec for run in runs}) == 1:
         runs = [replace(run, label=run.scenario.name) for run in runs]
     return runs, tuple(refused)

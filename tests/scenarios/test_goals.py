@@ -10,7 +10,7 @@ from scipy.stats import PermutationMethod, wilcoxon
 from hierarchy import Hierarchy
 from scenarios import load, simulate
 from scenarios.measure.causes import Tick, causes
-from scenarios.measure.goals import Goal, goals
+from scenarios.measure.goals import Goal, goals, percent
 from scenarios.measure.happenings import given_up, happened, jumps
 from scenarios.measure.metrics import measure
 from scenarios.measure.runs import Run
@@ -38,6 +38,12 @@ def test_median_worst_and_share_count_from_when_the_target_was_first_reached():
     assert (one.reached, one.first) == (1.0, 3.0)
     assert (one.median, one.worst, one.share) == pytest.approx((1.75e-3, 4e-3, 0.5))
     assert (one.flag, one.unit) == ("left", "m")
+
+
+@pytest.mark.parametrize(("share", "said"), [
+    (0.5, "50 %"), (0.994, "99 %"), (0.9951, "99.5 %"), (0.99999, "99.9 %"), (1.0, "100 %")])
+def test_only_a_whole_share_is_said_to_be_all_of_it(share, said):
+    assert percent(share) == said
 
 
 @pytest.mark.parametrize(("signals", "name", "flag", "worst", "unit"), [

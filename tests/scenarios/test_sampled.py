@@ -58,7 +58,9 @@ def table(file):
     ("", {"scenarios": '["ellipse", "ellipse"]'}, "2 scenarios are named 'ellipse'"),
     ("", {"resolvers": '["tpm:dampign=0.1"]'}, "dampign"),
     ("", {"duration": "-1.0"}, "duration: "),
-    ("start.q = { arround = 0.1 }", {}, "parameters.start.q.arround: "),
+    ("start.q = { arround = 0.1 }", {}, "unknown key 'parameters.start.q.arround'; did you mean "
+     "'parameters.start.q.around'"),
+    ("start.q = 3", {}, "parameters.start.q: expected one table"),
     ("start.q = { around = [0.1, 0.2] }", {}, "parameters.start.q: scenario 'ellipse': around"),
     ("position.gain = { uniform = [2.0, 1.0] }", {}, "parameters.position.gain.uniform: "),
     ("position.gian = { uniform = [1.0, 2.0] }", {}, "unknown key 'position.gian'; did you"),

@@ -55,6 +55,15 @@ def test_check_says_that_no_starts_can_be_drawn_from_a_variation_of_unknown_keys
     assert said.startswith("no sampled starts: variation.start.qq: scenario 'ellipse': unknown key")
 
 
+def test_check_says_which_faults_and_pushes_come_after_the_run():
+    fault = {"kind": "stale", "duration": 0.1}
+    late = load("stand-push", {"faults": [{**fault, "at": 0.0}, {**fault, "at": 9.0}],
+                               "control.duration": 0.2, "plant.pushes.0.at": 0.3})
+    assert [one for one in first_tick(late).warnings if "after" in one] == [
+        "faults.1.at = 9 s is after the run, which ends at 0.2 s",
+        "plant.pushes.0.at = 0.3 s is after the run, which ends at 0.2 s"]
+
+
 def test_rounding_of_a_robot_at_rest_at_its_targets_is_not_said_to_be_missed():
     """A posture was missed by 1.42e-14, held back by grip and tray."""
     hand, grip = {"frame": "right_hand"}, {"frame": "left_hand", "to": "right_hand"}
@@ -148,6 +157,7 @@ H = Hierarchy.from_levels([([[1.0, 0.0]], [-0.1], [0.1]), ([[1.0, 0.5]], [0.3])]
     (lambda: simulate(SHORT, audits=3), "simulate: audits: expected an Iterable, got int 3"),
     (lambda: simulate("elipse"), "unknown scenario 'elipse'; did you mean 'ellipse'?"),
     (lambda: compare(3), "compare: expected names, files, or what `load` returns, got int 3"),
+    (lambda: compare([]), "no scenario was given"),
     (lambda: compare("ellipse", "hcod"), "resolvers: expected a list of names, got str 'hcod'"),
     (lambda: compare(SHORT, ["tpm"], out=3), "compare: out: expected a path, got int 3"),
     (lambda: save("ellipse", "x"), "save: expected a Recording, got str 'ellipse'"),

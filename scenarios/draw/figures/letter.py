@@ -95,6 +95,7 @@ def redraw(runs: Sequence[str | Path], style: str = "screen",
     with drawing.styled(drawing.STYLES[style]), named(claimed or runs[0]), writing as partial:
         write_all(recordings, partial)
         names = sorted(file.name for file in partial.iterdir())
+        refuse(not names, f"{runs[0]}: a run of fewer than two ticks has no figure")
     return [(claimed or Path(runs[0])) / name for name in names]
 
 
