@@ -70,7 +70,7 @@ class Factorization:
         if n is None:
             A = readable(f"{names[0]}: A", levels[0])
             n = A.shape[1] if A.ndim == 2 else 0
-        elif not isinstance(n, Integral) or n < 1:
+        elif isinstance(n, bool) or not isinstance(n, Integral) or n < 1:
             raise HierarchyError(f"n = {n!r}, expected a whole number >= 1")
         self._n = int(n)
         self._factor_afresh([(name, self._checked(name, A))

@@ -66,7 +66,7 @@ class Space(NamedTuple):
     """Settings, the box, and intermediate results.
 
     release: whether saturated joints are released. of_miss: whether s scales the residual of a
-    task instead of b. low, up, reference (n,).
+    task instead of b. low, up, reference (n,). unit (1,): the largest |bound|, at most 1.
 
     Q has columns for the tasks above, then one for each held joint in the order of holding; the
     rest is free. basis: its reflectors. E (n, n): unit vectors of the held joints, in coordinates
@@ -84,6 +84,7 @@ class Space(NamedTuple):
     low: View
     up: View
     reference: View
+    unit: View
     basis: View
     E: View
     joint: View
@@ -106,6 +107,7 @@ def _carve(settings, work, m, n):
     low, at = vector(work, 0, n)
     up, at = vector(work, at, n)
     reference, at = vector(work, at, n)
+    unit, at = vector(work, at, 1)
     basis, at = matrix(work, at, n, n)
     E, at = matrix(work, at, n, n)
     joint, at = integers(work, at, n)
@@ -120,8 +122,8 @@ def _carve(settings, work, m, n):
     trial, at = matrix(work, at, 1, n)
     best, at = vector(work, at, n)
     of_block, at = vector(work, at, (m + n) * (n + 1))
-    return Space(shared(settings), settings[3] > 0.0, settings[4] > 0.0, low, up, reference, basis,
-                 E, joint, side, y, rows, seen, now, zero, line, y_a, trial, best,
+    return Space(shared(settings), settings[3] > 0.0, settings[4] > 0.0, low, up, reference, unit,
+                 basis, E, joint, side, y, rows, seen, now, zero, line, y_a, trial, best,
                  of_block), at
 
 
@@ -169,16 +171,22 @@ def sns(A, lower, upper, sizes, x, record, settings, work):
 def _record_bounds(x, space, record):
     """Put x exactly on the bounds that it touches, and write which."""
     for c in range(x.size):
-        if _touches(x[c], space.up[c]):
+        if _touches(x[c], space.up[c], space):
             x[c], record[c] = space.up[c], 2.0 if space.low[c] == space.up[c] else 1.0
-        elif _touches(x[c], space.low[c]):
+        elif _touches(x[c], space.low[c], space):
             x[c], record[c] = space.low[c], -1.0
 
 
 @inlined
-def _touches(x, side):
+def _touches(x, side, space):
     """Whether x is at this side of the box, up to rounding."""
-    return abs(side) < np.inf and abs(x - side) <= BOUND_KEPT * (1.0 + abs(side))
+    return abs(side) < np.inf and abs(x - side) <= _rounding(side, space)
+
+
+@inlined
+def _rounding(side, space):
+    """How far beyond this side of the box x may be."""
+    return BOUND_KEPT * (space.unit[0] + abs(side))
 
 
 @inlined
@@ -193,6 +201,10 @@ def _read_box(A, lower, upper, space, record):
             record[record.size - 1] = i
             return CONTRADICTION
         low[c] = min(low[c], up[c])
+    largest = 0.0
+    for c in range(low.size):
+        largest = max(largest, abs(low[c]), abs(up[c]))
+    space.unit[0] = min(largest, 1.0)
     return code
 
 
@@ -317,8 +329,8 @@ def _improves(x, space, at, s):
     reflect_back(space.basis, 0, at.task, trial, 0, 1)
     for j in range(x.size):
         low, up, value = space.low[j], space.up[j], x[j] + trial[0, j]
-        inside = inside and not value > up + 10.0 * BOUND_KEPT * (1.0 + abs(up))
-        inside = inside and not value < low - 10.0 * BOUND_KEPT * (1.0 + abs(low))
+        inside = inside and not value > up + 10.0 * _rounding(up, space)
+        inside = inside and not value < low - 10.0 * _rounding(low, space)
     if inside:
         assign(space.best, trial[0])
     return inside
@@ -339,8 +351,8 @@ def _scaling(space):
         if side[j] != 0.0:
             continue
         low, up = space.low[j], space.up[j]
-        low = low - c[j] - BOUND_KEPT * (1.0 + abs(low)) if low > -np.inf else low
-        up = up - c[j] + BOUND_KEPT * (1.0 + abs(up)) if up < np.inf else up
+        low = low - c[j] - _rounding(low, space) if low > -np.inf else low
+        up = up - c[j] + _rounding(up, space) if up < np.inf else up
         if a[j] != 0.0:
             s_min, s_max = min(low / a[j], up / a[j]), max(low / a[j], up / a[j])
         else:

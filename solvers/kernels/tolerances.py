@@ -19,7 +19,7 @@ VIOLATED = 1e-9      # violation at which a row enters, relative to its terms
 SATURATES = 10.0     # excess of a row over |x|, times this: share that damping takes for held
 LEVEL_MET = 1e-10    # violation of a level of which tpm says that it is met, relative to its terms
 LARGER = 1e3         # x with rows that were neglected, over 1 + |x| without: more is rounding
-BOUND_KEPT = 1e-12   # of sns, relative to 1 + |bound|
+BOUND_KEPT = 1e-12   # of sns, relative to |bound| + the largest |bound| up to 1
 SHADOW = 1e-5        # of the largest number so far: part of the scale of x in the search
 FLOOR = 1e-3         # the same in the pass level by level
 

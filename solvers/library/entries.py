@@ -228,7 +228,7 @@ def work_size(n, m, levels):
     """
     block = (m + n) * (n + 1)
     recursive = 2 * m * n + 2 * n * n + 2 * m + 2 * n + 2 * block
-    saturation = 2 * n * n + 13 * n + m * (2 * n + 5) + block  # the staircase needs less
+    saturation = 2 * n * n + 13 * n + 1 + m * (2 * n + 5) + block  # the staircase needs less
     return SETTINGS + max(n + exact_size(n, m, levels, True), recursive, saturation,
                           OWN + 3 * levels + merged_size(n, m, levels, False))
 

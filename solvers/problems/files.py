@@ -89,7 +89,7 @@ class Collection:
         with naming(str(path), ProblemFileError, ValueError):
             _content(_head(head), arrays)
             said = json.dumps(head, indent=1, allow_nan=False)
-        with zipfile.ZipFile(path, "w", zipfile.ZIP_STORED) as archive:
+        with zipfile.ZipFile(file_path("save", path), "w", zipfile.ZIP_STORED) as archive:
             archive.writestr(zipfile.ZipInfo(_HEAD, _STAMP), said)
             for name, values in arrays.items():
                 stream = io.BytesIO()

@@ -146,6 +146,7 @@ def test_rows_whose_squares_overflow_are_a_status_until_they_are_deleted():
     (lambda f: f.solve([[1.0, np.inf], [1.0]]), "hand, row 1: target is inf"),
     (lambda f: Factorization([]), "no levels and no n"),
     (lambda f: Factorization([], n=0), "n = 0, expected a whole number >= 1"),
+    (lambda f: Factorization([], n=True), "n = True, expected a whole number >= 1"),
     (lambda f: Factorization([np.eye(2), np.eye(3)]), "level 2: A has shape (3, 3)"),
     (lambda f: Factorization([np.ones((1, 0))]), "level 1: A has shape (1, 0), expected (rows, n)"),
     (lambda f: Factorization([], n=2, settings=make("tpm-published")), "staircase form"),

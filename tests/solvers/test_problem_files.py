@@ -154,6 +154,16 @@ def test_what_could_not_be_read_is_not_written(small, change, said):
     assert small.read_bytes() == before
 
 
+def test_a_file_of_problems_is_written_where_it_is_read(small, tmp_path, monkeypatch):
+    """A path with ~ went to a folder of that name, which is seldom there."""
+    monkeypatch.setenv("HOME", str(tmp_path))
+    monkeypatch.setenv("USERPROFILE", str(tmp_path))
+    collection = read(small)
+    collection.save("~/again.npz")
+    assert read("~/again.npz").digest == collection.digest
+    refused("save: expected a path, got NoneType None", collection.save, None)
+
+
 def test_a_single_hierarchy_in_a_file_passes_the_same_gate(tmp_path):
     path, h = tmp_path / "one.npz", problems.generate(3)
     h = h.changed(metric=2.0 * np.eye(h.n), give=np.full(h.m, 0.1))

@@ -196,8 +196,8 @@ def _add_record(record, inner, lower, upper, d, x, end, k):
 def _stays(a, low, up, state, x):
     """Whether x is at the side of a row that is active there by its state, or beyond it."""
     side = up if state > 0.0 else low
-    inside = state * (side - inner_product(a, x))
-    return abs(state) == 1.0 and inside <= LEVEL_MET * (1.0 + abs(side))
+    return abs(state) == 1.0 and (state * (side - inner_product(a, x))
+                                  <= LEVEL_MET * (1.0 + abs(side)))
 
 
 @inlined
