@@ -186,8 +186,4 @@ def figures(folders: Runs,
     """
     from scenarios.draw.figures.letter import redraw
 
-    drawn = redraw(_each(folders), style, out)
-    if not drawn:
-        print("hierarchy: warning: nothing to draw: a figure needs a run of two ticks or more",
-              file=sys.stderr)
-    print_files(drawn, as_json)
+    print_files(redraw(_each(folders), style, out), as_json)

@@ -211,14 +211,6 @@ def test_a_joint_whose_name_begins_with_an_underscore_is_in_the_legend():
     assert [text.get_text() for text in fig.legends[0].texts] == [*robot.velocity_names]
 
 
-def test_a_run_of_one_tick_makes_no_figures_which_is_said(tmp_path, command):
-    """An empty line was."""
-    run_folder = save(recording(t=[0.0]), tmp_path / "run")
-    told = command("figures", run_folder, "--out", tmp_path / "figures")
-    assert told.out == ""
-    assert "nothing to draw" in told.err
-
-
 def test_a_picture_links_the_body_with_the_surface_and_shows_where_listed_tasks_are_to_go(
         tmp_path):
     scenario = load("wipe", {"control.duration": 0.02, "avoidance": {
