@@ -59,8 +59,6 @@ ROUNDING = 1e-12  # of a position, relative to 1 + its limit: closer to a limit 
 _FAR = 1e100      # [rad] stands for an infinite distance
 _CLEARANCE = 1e-3  # [rad or m] at which a horizon brings joints to rest before a position limit,
 #                    so that a disturbance of 0.02 rad/s does not shorten it
-
-
 _LEVELS = ("velocity", "acceleration")
 
 

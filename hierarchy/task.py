@@ -361,12 +361,12 @@ class Written(Task):
     def rows(self, state: State, level: Level = "velocity") -> Rows:
         """The rows at a state; of forces, see `ForceTask`."""
         check_choice(f"task {self.name!r}: level", level, get_args(Level))
-        columns, known = state.n, self.on(state.robot)
+        columns = state.n
         if self.of_forces:
             level = "acceleration" if self.contacts is None else "torque"
             columns = columns if self.contacts is None else self.contacts.unknowns
-        rows = Rows.empty(known.dimension, columns)
-        known.writer(state, level, rows)()
+        rows = Rows.empty(self.dimension, columns)
+        self.writer(state, level, rows)()
         return rows
 
     def jacobian(self, state: State) -> Array:

@@ -30,8 +30,8 @@ _OTHERS = CALLS.with_name("others.toml")
 # The object file of a kernel is the first with the beginning of its name. Those of "others" share
 # little with the rest: apart, two cores are busy until all is compiled, the longest first.
 PARTS = {
-    "others": ("solvers.adapters", "solvers.metric",
-               *map("solvers.kernels.".__add__, ("met.", "published", "reverse", "staircase"))),
+    "others": ("solvers.adapters", "solvers.metric", "solvers.kernels.met.",
+               "solvers.kernels.published", "solvers.kernels.reverse", "solvers.kernels.staircase"),
     "robots": ("hierarchy", "scenarios"), "solvers": ("solvers",)}
 # Together they have every kind of task, sensor and plant of the shipped scenarios.
 _SCENARIOS = ("crawl", "dual-arm", "ellipse", "ellipse-3d", "ellipse-danger-bounds", "ellipse-hqp",

@@ -134,7 +134,7 @@ def print_lists(lists: dict[str, dict[str, str]], as_json: bool = False) -> None
 def print_files(files: list[Path], as_json: bool) -> None:
     """Print the files that a command has written."""
     names = [shown(file) for file in files]
-    print_json({"files": names}) if as_json else print(*names, sep="\n", end="\n" * bool(names))
+    print_json({"files": names}) if as_json else print(*names, sep="\n")
 
 
 def first_line(thing: Any) -> str:

@@ -67,9 +67,9 @@ class Program(NamedTuple):
         weight = float(self.P.diagonal().max(initial=0.0)) or 1.0
         size = unit * max(float(norm(self.q)) / weight, float(
             abs(np.clip(0.0, self.lower, self.upper)).max(initial=0.0))) or 1.0
-        start = None if self.start is None else self.start / size
-        if start is not None and not norm(start) <= _FAR:
-            start = None
+        start = None
+        if self.start is not None and norm(self.start) <= _FAR * size:
+            start = self.start / size
         return Program(self.P / weight, self.q / (weight * size), self.A, self.lower / size,
                        self.upper / size, self.F, self.f / size, start), size
 
