@@ -41,7 +41,9 @@ class Backend:
 
 
 BACKENDS: Mapping[str, Backend] = MappingProxyType({backend.name: backend for backend in (
-    Backend("proxqp", "proxsuite", 1e-6, {"eps_abs": 1e-9, "eps_rel": 0.0, "max_iter": 1000},
+    # Its test of infeasibility met half of the programs of humanoids, all of which are feasible.
+    Backend("proxqp", "proxsuite", 1e-6, {"eps_abs": 1e-9, "eps_rel": 0.0, "max_iter": 1000,
+                                          "primal_infeasibility_solving": True},
             starts=True, core=True),
     Backend("osqp", "osqp", 1e-5, {"eps_abs": 1e-7, "eps_rel": 1e-7, "max_iter": 20000},
             sparse=True, halved=True, scaled=False, starts=True, core=True),

@@ -10,13 +10,14 @@ from numpy.typing import NDArray
 
 from hierarchy.problem import Array
 
-REFINEMENTS = 100  # most steps from a backend's active set to the exact one
+REFINEMENTS = 60  # most steps from a backend's active set to the exact one
 AT_ONCE = 10  # steps that change all rows on the wrong side, before as many that change one
 MOST_HELD = 0.8  # share of the active rows: if more are at their side, the others alone leave
 EXACT = 1e-10  # relative tolerance of the optimality conditions
 LITTLE = 1e-3  # rows violated by less are assumed to hold at a nearby minimiser
 LARGEST = 1e50  # entry: sums of products of four stay finite; beyond, backends run for minutes
 ROUNDING = 1e-15  # entry of a row over its norm: rounding
+ROUGH = 1e-3  # weight, relative to a goal, of what the goal cannot see: its active rows are seen
 ACTIVE = 1e-6  # distance to its side, relative to 1 + |side|, at which a row is a candidate
 
 
@@ -131,26 +132,11 @@ def refined(z: Array, E: Array, e: Array, limits: Rows, kept: Rows, rank_toleran
 
     Minimises ||E z - e||^2 + ||excess of limits||^2 within the kept rows. Returns z, and +1, -1 or
     0 for each limit that is violated above, below, or not. The result satisfies the optimality
-    conditions; None if no step did. Rows are of order one; directions with singular values up to
-    `rank_tolerance` do not move.
+    conditions; None if no step did, from a projection of z either. Rows are of order one;
+    directions with singular values up to `rank_tolerance` do not move.
     """
-    program, k = _Refinement(E, e, limits, kept, rank_tolerance), len(kept.A)
-    excess = limits.excess(z)
-    sides = np.concatenate([kept.sides(z, ACTIVE), np.sign(excess) * (abs(excess) > ACTIVE)])
-    for step in range(REFINEMENTS):
-        new = program.minimiser(z, sides[:k], sides[k:])
-        if not np.isfinite(new).all():
-            return None
-        optimal, wanted = program.judged(new, sides[:k], sides[k:])
-        if optimal:
-            return new, wanted[k:]
-        changed = np.flatnonzero(wanted != sides)
-        if not len(changed):
-            return None
-        if step // AT_ONCE % 2:  # changing all rows at once has cycled
-            changed = changed[step // 2 % len(changed), None]
-        sides[changed] = wanted[changed]
-    return None
+    program = _Refinement(E, e, limits, kept, rank_tolerance)
+    return program.solved_from(z) or program.solved_from(program.projected(z))
 
 
 class _Refinement(NamedTuple):
@@ -162,6 +148,26 @@ class _Refinement(NamedTuple):
     kept: Rows
     rank_tolerance: float
 
+    def solved_from(self, z: Array) -> tuple[Array, Array] | None:
+        """Return what `refined` returns, from the active set at z."""
+        kept, limits, k = self.kept, self.limits, len(self.kept.A)
+        excess = limits.excess(z)
+        sides = np.concatenate([kept.sides(z, ACTIVE), np.sign(excess) * (abs(excess) > ACTIVE)])
+        for step in range(REFINEMENTS):
+            new = self.minimiser(z, sides[:k], sides[k:])
+            if not np.isfinite(new).all():
+                return None
+            optimal, wanted = self.judged(new, sides[:k], sides[k:])
+            if optimal:
+                return new, wanted[k:]
+            changed = np.flatnonzero(wanted != sides)
+            if not len(changed):
+                return None
+            if step // AT_ONCE % 2:  # changing all rows at once has cycled
+                changed = changed[step // 2 % len(changed), None]
+            sides[changed] = wanted[changed]
+        return None
+
     def minimiser(self, z: Array, active: Array, broken: Array) -> Array:
         """Return the minimiser nearest to z that holds the active rows at their sides."""
         on, out = active != 0, broken != 0
@@ -172,6 +178,25 @@ class _Refinement(NamedTuple):
         step_in, unseen = least(B @ free, c - B @ new, lengths(B), self.rank_tolerance)
         others = self.kept.where(~on).and_(self.limits.where(~out))
         return _moved_inside(new + free @ step_in, free @ unseen, others)
+
+    def projected(self, z: Array) -> Array:
+        """Return the minimiser to some digits, as a projection onto the kept rows.
+
+        It is nearest, as E measures distances, to the minimiser without rows; along what E does
+        not see, next to z.
+        """
+        U, s, Vt = np.linalg.svd(self.E)
+        largest = s.max(initial=0.0) or 1.0
+        rank, k = int((s > ROUGH * largest).sum()), self.limits.lower.size
+        stretch = np.full(len(z), 1.0 / (ROUGH * largest))
+        stretch[:rank] = 1.0 / s[:rank]
+        D = Vt.T * stretch
+        centre = z + D[:, :rank] @ (U.T @ (self.e - self.E @ z))[:rank]
+        on, out = self.kept.from_(centre), self.limits.from_(centre)
+        M = np.block([[on.A @ D, np.zeros((on.lower.size, k))], [out.A @ D, -np.eye(k)]])
+        y = _shortest(Rows(M, np.concatenate([on.lower, out.lower]),
+                           np.concatenate([on.upper, out.upper])))
+        return np.asarray(centre + D @ y[:len(z)])
 
     def judged(self, z: Array, active: Array, broken: Array) -> tuple[bool, Array]:
         """Return whether z is optimal, and the sides that its rows and multipliers suggest."""
@@ -231,22 +256,30 @@ class _Refinement(NamedTuple):
 def _moved_inside(z: Array, D: Array, rows: Rows) -> Array:
     """Return the point z + D y nearest to z at which slightly violated rows hold.
 
-    The least-distance problem of Lawson and Hanson (1974, ch. 23), by non-negative least squares.
     Returns z if the rows hold, are violated by more than a little, or cannot all hold.
     """
     off = float(abs(rows.excess(z)).max(initial=0.0))
     if not ROUNDING < off < LITTLE or not D.shape[1]:
         return z
-    value, M = rows.A @ z, rows.A @ D
+    shift = rows.from_(z)
+    return np.asarray(z + D @ _shortest(Rows(rows.A @ D, shift.lower, shift.upper)))
+
+
+def _shortest(rows: Rows) -> Array:
+    """Return the shortest y within the rows; zeros if none was found.
+
+    The least-distance problem of Lawson and Hanson (1974, ch. 23), by non-negative least squares.
+    """
     up, low = np.isfinite(rows.upper), np.isfinite(rows.lower)
-    G = np.vstack([-M[up], M[low]])
-    g = np.concatenate([value[up] - rows.upper[up], rows.lower[low] - value[low]]) / off
-    target = np.zeros(D.shape[1] + 1)
+    off = float(abs(np.clip(0.0, rows.lower, rows.upper)).max(initial=0.0)) or 1.0
+    G = np.vstack([-rows.A[up], rows.A[low]])
+    g = np.concatenate([-rows.upper[up], rows.lower[low]]) / off
+    target = np.zeros(G.shape[1] + 1)
     target[-1] = 1.0
     u, rest = _non_negative(np.vstack([G.T, g]), target)
     if not ACTIVE < rest < np.inf:  # 1 / rest is the length of y: no point, or none nearby
-        return z
-    return np.asarray(z + D @ (G.T @ u) * (off / (1.0 - g @ u)))
+        return np.zeros(G.shape[1])
+    return np.asarray(G.T @ u * (off / (1.0 - g @ u)))
 
 
 def below_largest(*arrays: Array, scale: float = 1.0) -> bool:

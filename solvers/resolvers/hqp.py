@@ -216,10 +216,10 @@ class _Cascade:
                 return self._least_squares(z, E, e, own, lam), np.empty(0)
             rows = np.vstack([E, limits_seen.sided().A, kept_seen.sided().A])
             visible = split(rows, lengths(rows), EXACT)[0]  # backends went 1e8 along the rest
-            for start in (visible @ (visible.T @ z), np.zeros_like(z)):  # where kept rows hold
-                exact = refined(start, E, e, limits_seen, kept_seen, s.rank_tolerance)
-                if exact is not None:
-                    return exact
+            exact = refined(visible @ (visible.T @ z), E, e, limits_seen, kept_seen,
+                            s.rank_tolerance)
+            if exact is not None:
+                return exact
         raise _StopError(Status.INACCURATE if vouched else Status.BACKEND_FAILURE)
 
     def _target(self, goal: Rows, seen: Rows, own: Array, lam: float, last: bool

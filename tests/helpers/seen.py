@@ -36,7 +36,7 @@ from scenarios import Scenario, load, load_run, shipped, simulate
 from scenarios import export as mcap
 from scenarios.cell.plants import physics, torque
 from scenarios.cell.sensors import depth_sensor
-from scenarios.cli import doctor, runs
+from scenarios.cli import doctor, runs, terminal
 from scenarios.cli.main import run_command
 from scenarios.config.distributions import Distribution
 from scenarios.draw import replay
@@ -201,6 +201,7 @@ def steadily():
                 ("sys", SimpleNamespace(version="3.11.2 (main)", version_info=(3, 11)), (doctor,)),
                 ("installed", ("osqp", "proxqp").__contains__, (backends,)),
                 ("REST", 0.004, (safety,)),  # [s]
+                ("_EVERY", np.inf, (terminal,)),  # [s]: a slow machine prints no lines of progress
                 ("cache_folder", lambda: Path("cache"), (jit,)),
                 ("versions", lambda: {"python": "3"}, (run_folder, comparing, sampled,
                                                        sampled_page)),

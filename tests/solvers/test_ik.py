@@ -403,7 +403,7 @@ def test_with_bounds_alone_an_arm_stretched_out_of_reach_stays_at_rest():
     (0.0, 0.0, 0.0), (0.5, 0.0, 0.0), (0.0, 0.6, 0.0), (0.0, 0.0, 1.0), (-2.0, 1.0, -1.0)])
 def test_hcod_is_certified_and_agrees_with_a_cascade_of_programs(shift, faces):
     h, res = physical(standing_stack(STANDING, CONTACTS, shift, faces=faces))
-    for backend in filter(installed, ("clarabel", "piqp", "quadprog")):  # which solve all of them
+    for backend in filter(installed, ("clarabel", "piqp", "proxqp", "quadprog")):  # all of them
         other = make("hqp", backend=backend).solve(h)
         assert other.status is Status.SOLVED
         assert np.abs(other.x - res.x).max() <= 1e-8 * (1.0 + np.abs(res.x).max())

@@ -132,6 +132,7 @@ def test_osqp_does_not_look_for_its_builds_at_each_program_whichever_backend_cam
 
 def test_a_backend_that_raises_is_a_status_and_the_level_of_limits_is_kept(monkeypatch):
     monkeypatch.setattr("qpsolvers.solve_problem", lambda *_, **__: 1 / 0)
+    monkeypatch.setattr("solvers.qp.refinement._Refinement.projected", lambda _, z: z)
     monkeypatch.setattr("solvers.qp.refinement.REFINEMENTS", 5)  # more do without a backend
     h = next(iter(family("HUM38")))[0]
     res = make("hqp", backend="proxqp").solve(h)
