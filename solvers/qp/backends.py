@@ -20,6 +20,7 @@ class Backend:
     module : the module to import; from the package's dependencies or its extra `qp`.
     accuracy : of x, relative to 1 + |x|; an answer that is not shown to reach it is not used.
     options : its tolerances, passed on by qpsolvers.
+    insisting : options added for a second call if the first finds a program infeasible: none is.
     sparse : whether it needs sparse matrices.
     halved : whether it reads the upper half of the Hessian, and is slow to cut off the other.
     scaled : whether it gets unknowns of order one, as its tolerances are not relative to them.
@@ -32,6 +33,7 @@ class Backend:
     module: str
     accuracy: float
     options: Mapping[str, Any]
+    insisting: Mapping[str, Any] | None = None
     sparse: bool = False
     halved: bool = False
     scaled: bool = True
@@ -41,10 +43,8 @@ class Backend:
 
 
 BACKENDS: Mapping[str, Backend] = MappingProxyType({backend.name: backend for backend in (
-    # Its test of infeasibility met half of the programs of humanoids, all of which are feasible.
-    Backend("proxqp", "proxsuite", 1e-6, {"eps_abs": 1e-9, "eps_rel": 0.0, "max_iter": 1000,
-                                          "primal_infeasibility_solving": True},
-            starts=True, core=True),
+    Backend("proxqp", "proxsuite", 1e-6, {"eps_abs": 1e-9, "eps_rel": 0.0, "max_iter": 1000},
+            {"primal_infeasibility_solving": True}, starts=True, core=True),
     Backend("osqp", "osqp", 1e-5, {"eps_abs": 1e-7, "eps_rel": 1e-7, "max_iter": 20000},
             sparse=True, halved=True, scaled=False, starts=True, core=True),
     Backend("quadprog", "quadprog", 1e-6, {}, regularisation=1e-9),

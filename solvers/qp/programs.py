@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import warnings
+from collections.abc import Mapping
 from threading import Lock
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from numpy.linalg import norm
@@ -42,22 +43,29 @@ class Program(NamedTuple):
 
         unit : multiple of the size of y in which y is passed to a backend that is `scaled`.
         """
-        import qpsolvers
-
         program, size = self._scaled(unit if backend.scaled else 0.0)
         if backend.halved:
             program = program._replace(P=np.triu(program.P))
+        y, found = program._answer(backend, backend.options)
+        if not found and backend.insisting:
+            y, found = program._answer(backend, {**backend.options, **backend.insisting})
+        return size * y, found
+
+    def _answer(self, backend: Backend, options: Mapping[str, Any]) -> tuple[Array, bool]:
+        """Return what `solve` does, of this program as it is."""
+        import qpsolvers
+
         with _WARNINGS, warnings.catch_warnings():
             warnings.simplefilter("ignore")  # the backend's status says the same
             try:
                 solution = qpsolvers.solve_problem(
-                    program.problem(backend.sparse, backend.regularisation), solver=backend.name,
-                    initvals=program.start if backend.starts else None, **backend.options)
+                    self.problem(backend.sparse, backend.regularisation), solver=backend.name,
+                    initvals=self.start if backend.starts else None, **options)
             except Exception:  # backends raise any exception; each is a failure
                 return np.zeros(len(self.q)), False
         if solution.x is None or not np.isfinite(solution.x).all():
             return np.zeros(len(self.q)), False
-        return size * solution.x, bool(solution.found)
+        return np.asarray(solution.x), bool(solution.found)
 
     def _scaled(self, unit: float) -> tuple[Program, float]:
         """Return the program with a Hessian and an answer of order one, and what that counts.
