@@ -8,13 +8,14 @@ from typing import Annotated, Any
 
 import typer
 
-from scenarios.cli.options import AsJson, Out, Workers, output
+from scenarios.cli.options import AsJson, Out, Workers, output, refuse_given
 from scenarios.cli.terminal import shown
 
 _ACCURACY, _GROWTH = "solve.first_paper:accuracy", "solve.first_paper:growth"
 _STRICTNESS = "peers.moving:strictness"
 _USUAL = ("solve.resolvers", "tick", _ACCURACY, _GROWTH, _STRICTNESS, "start")
 _DAY = 86_400.0  # [s]
+_BESIDE = "cannot be combined with "
 _SCENES = {"ellipse": "peers.moving", "stand": "peers.standing"}
 
 Seconds = Annotated[float, typer.Option("--seconds", min=0.001, max=_DAY, metavar="S",
@@ -70,6 +71,8 @@ def main(ctx: typer.Context, out: Out = None) -> None:
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # before numpy is loaded: one core is timed
     if ctx.invoked_subcommand is None:
         _run(out, *_USUAL)
+    else:
+        refuse_given(ctx, f"comes after {ctx.invoked_subcommand}", "out")
 
 
 def _add(name: str, words: str, *modules: str, **options: tuple[Any, Any]) -> None:
@@ -115,7 +118,7 @@ _add("batch", "Measure how many problems per second batches solve.", "batch",
 
 
 @bench.command()
-def peers(install: Install = False,
+def peers(context: typer.Context, install: Install = False,
           scene: Annotated[str | None, typer.Option(
               "--scene", metavar="NAME", help="Only `ellipse`, inverse kinematics of an arm, or "
               "`stand`, inverse dynamics of a humanoid on two feet.")] = None,
@@ -128,11 +131,11 @@ def peers(install: Install = False,
     from benchmark.packages import PACKAGES
     from hierarchy.errors import check_name
 
-    if scene is not None:
-        check_name("scene", scene, _SCENES)
     if install:
+        refuse_given(context, _BESIDE + "--install", "scene", "out")
         return _installed(PACKAGES)
     if scene is not None:
+        check_name("scene", scene, _SCENES)
         return _run(out, _SCENES[scene])
     _run(out, *_SCENES.values())
     return 0
@@ -147,7 +150,7 @@ _add("ik", """Compare inverse kinematics with pink, mink and placo.
 
 
 @bench.command("open")
-def open_(family: Family = None,
+def open_(context: typer.Context, family: Family = None,
           entrants: Annotated[list[str] | None, typer.Option(
               "--entrant", metavar="LABEL", help="Only this entrant of the table, or FILE.py:CLASS "
               "for yours. May be repeated.")] = None,
@@ -191,10 +194,13 @@ def open_(family: Family = None,
     from scenarios.problems.families import family as named
 
     if install:
+        refuse_given(context, _BESIDE + "--install", *context.params.keys() - {"install"})
         return _installed((EMBODIK, HIGHS))
     more = compiled(library or [], name or [])
     table = more if check and more and not entrants else chosen(entrants or [], python, more)
     if check:
+        refuse_given(context, _BESIDE + "--check", "family", "fresh", "count", "public", "borders",
+                     "out")
         tried = opened.check(table, limit)
         tried.say()
         return int(tried.failed)
@@ -226,7 +232,7 @@ _add("stress", """Certify a resolver's answers to generated problems.
          "--processes", min=1, metavar="N", help="Default: one for each core.")], None))
 
 
-def reproduce(names: Annotated[list[str] | None, typer.Argument(
+def reproduce(context: typer.Context, names: Annotated[list[str] | None, typer.Argument(
                   metavar="[NAME]...", help="`protocol`, the runs of docs/protocol.md, `fronts`, "
                   "tuned methods, or a page such as docs/results/problems.md for the commands in "
                   "it. Default: all.")] = None,
@@ -245,4 +251,6 @@ def reproduce(names: Annotated[list[str] | None, typer.Argument(
     """
     from benchmark.reproduce import whole
 
+    if fill:
+        refuse_given(context, _BESIDE + "--fill", *context.params.keys() - {"fill"})
     return whole.fill() if fill else whole.run(names or [], out, quick, workers, as_json)
