@@ -208,7 +208,8 @@ def test_the_command_runs_continues_and_writes_its_page(tmp_path, command, monke
     assert len(first) == 8  # four files of problems, four of rows
     assert len(list(out.glob("borders/*/*.npz"))) == 4 * 8
     (out / "missing.json").write_text('{"absent": "not installed", "Moody": "not installed"}')
-    said = command(*line, "--entrant", f"{HELPERS / 'fake_entrants.py'}:Moody")
+    said = command(*line, "--count", 4, "--entrant", f"{HELPERS / 'fake_entrants.py'}:Moody")
+    assert "integers-fresh-9 has 3 problems, not 4: they stay as they are" in said.err
     missing = json.loads((out / "missing.json").read_text())
     assert (missing["absent"], "Moody" in missing) == ("not installed", False)
     assert first.items() <= {file: file.stat().st_mtime_ns for file in out.glob("*/*.*")}.items()
