@@ -24,6 +24,7 @@ WAYPOINTS = ["position.path.times=[0, 1]", "position.path.points=[[0, 0, 0], [0,
 @pytest.mark.parametrize(("name", "changes"), [
     ("ellipse", ["start.end_effector=[5, 5, 5]"]), ("ellipse", ["robot.model=ur5"]),
     ("stand-push", ["contacts.0.frame=left_fot"]),
+    ("ellipse-published", ["robot.control_points=[" + 8 * "{joint='joint_4'}," + "]"]),
     ("stand-push-smooth", ['control.options.merged.scales={"least forc"=9.0}']),
     ("human", ["plant.kind=kinematic", "control.metric=mass", "sensor.latency=0.01"])])
 def test_what_does_not_fit_the_robot_is_said_by_check_and_run(
