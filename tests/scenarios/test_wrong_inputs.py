@@ -81,6 +81,9 @@ def test_a_point_far_away_that_stands_for_a_direction_is_not_taken_for_millimetr
     turned = load("dual-arm", {"tasks": [{"kind": "posture", "joints": {"a": 90.0}}]})
     assert [*doubtful_units(turned)] == [
         "tasks.0.joints.a = 90 rad or m: joint angles are in radians"]
+    assert [*doubtful_units(load("stand-push", {"plant.pushes.0.direction": 0.5}))] == [
+        "plant.pushes.0.direction = 0.5 deg: cones and pushes are in degrees; all other angles are "
+        "in radians"]
 
 
 def test_obstacles_are_reached_by_number_or_all_at_once():
