@@ -105,7 +105,7 @@ def compare(context: typer.Context, scenarios: Annotated[list[str], typer.Argume
             resolvers: Annotated[str | None, typer.Option(
                 "--resolvers", metavar="SPEC,SPEC,...", autocompletion=opt.complete_resolvers,
                 help="Resolvers: name, or name:setting=value; or own, that of each scenario. "
-                     "Default: all suitable ones; own for a group.")] = None,
+                     "Default: a selection of suitable ones; own for a group.")] = None,
             changes: opt.Changes = None, plugin: opt.Plugins = None, duration: opt.Duration = None,
             out: Annotated[Path | None, opt.output(
                 "Output folder, new or empty; with --starts also one to resume. Default: a new "
