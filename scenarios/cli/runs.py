@@ -124,6 +124,8 @@ def compare(context: typer.Context, scenarios: Annotated[list[str], typer.Argume
     """
     if starts is None:
         opt.refuse_given(context, "needs --starts", "seed", "scheduler", "part")
+    if scheduler:
+        opt.refuse_given(context, "cannot be combined with --scheduler", "workers")
     from scenarios.config import members, shipped_groups
     from scenarios.config.scenario import OWN
     from scenarios.files import in_runs, next_free
@@ -173,7 +175,8 @@ def _compare(scenarios: list[Scenario], resolvers: list[str] | None, folder: Pat
 
 
 @opt.app.command()
-def sweep(file: Annotated[str, typer.Argument(help="Name of a sweep, or a sweep file.",
+def sweep(context: typer.Context,
+          file: Annotated[str, typer.Argument(help="Name of a sweep, or a sweep file.",
                                               autocompletion=opt.names_of("sweeps"))],
           out: Annotated[Path | None, opt.output(
               "Output folder, new or of a sweep to resume. Default: runs/sweep-NAME.")] = None,
@@ -183,6 +186,8 @@ def sweep(file: Annotated[str, typer.Argument(help="Name of a sweep, or a sweep 
 
     Run the same command again to resume an interrupted sweep.
     """
+    if scheduler:
+        opt.refuse_given(context, "cannot be combined with --scheduler", "workers")
     from scenarios.files import in_runs
     from scenarios.results.plan import load_sweep
     from scenarios.results.sampled import Workers

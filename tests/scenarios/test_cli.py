@@ -213,6 +213,8 @@ def test_an_error_names_the_one_file_of_a_command_once(text, files, said):
     ("run ellipse --no-wait --port 8081", "--wait/--no-wait, --port", "needs --live"),
     ("run ellipse --live --json", "--json", "cannot be combined with --live"),
     ("compare ellipse --seed 0 --part 1/2", "--seed, --part", "needs --starts"),
+    ("sweep ellipse-starts --scheduler a:1 --workers 2", "--workers",
+     "cannot be combined with --scheduler"),
     ("library --check --fix 7 5 3 --out c", "--fix", "cannot be combined with --check"),
     ("problems show a.npz --count 2", "--count", "is for a family, not for a file"),
     ("bench --out b tick", "--out", "comes after tick"),
