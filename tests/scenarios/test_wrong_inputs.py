@@ -147,6 +147,8 @@ H = Hierarchy.from_levels([([[1.0, 0.0]], [-0.1], [0.1]), ([[1.0, 0.5]], [0.3])]
     (lambda: load("ellipse-set-based", ["tasks=[{kind='self-collision', give=0.1}]"]),
      "tasks.0.give = 0.1 does not go with"),
     (lambda: load("ellipse-smooth", ["control.damping=2.0"]), "control.damping = 2 does not go"),
+    (lambda: load("ellipse", ["control.damping=0.05"]), 'damping = 0.05 goes with level = "veloc'),
+    (lambda: load("ellipse", ["control.transition_time=0.5"]), 's goes with transition = "blend"'),
     (lambda: load("ellipse-hqp", ["control.transition=blend"]),
      'control.transition = "blend" goes with control.stack = "switched", got "hierarchical"'),
     (lambda: load("ellipse", ["avoidance.place=null-space", "avoidance.dimension=3"]),
