@@ -223,8 +223,9 @@ _add("stress", """Certify a resolver's answers to generated problems.
     What is not certified is proved right or wrong, and what fails is saved. Exit code 1 if an
     answer fails.
     """, "stress",
-     count=(Annotated[int, typer.Option(min=1, metavar="N", help="Number of problems.")],
-            1_000_000),
+     count=(Annotated[int, typer.Option(
+         min=1, metavar="N", help="Number of problems, rounded up to as many of each kind.")],
+         1_000_000),
      resolver=(Annotated[str, typer.Option(metavar="NAME", help="Resolver to test.")], "hcod"),
      kind=(Annotated[str, typer.Option(metavar="KIND", help="Kind of problems.")], "all"),
      first=(Annotated[int, typer.Option(min=0, max=2**53, metavar="SEED", help="First seed.")], 0),
