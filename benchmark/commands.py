@@ -114,7 +114,9 @@ _add("first-paper", "Repeat the first TPM paper: accuracy and growth.", _ACCURAC
 _add("batch", "Measure how many problems per second batches solve.", "batch",
      counts=(Annotated[list[int] | None, typer.Option(
          "--count", min=1, metavar="N", help="Problems in a batch. May be repeated.")], None),
-     seconds=(Seconds, 1.0))
+     seconds=(Annotated[float, typer.Option(
+         "--seconds", min=0.001, max=_DAY, metavar="S",
+         help="Time for each size of a batch, family and resolver.")], 1.0))
 
 
 @bench.command()
