@@ -190,6 +190,7 @@ def test_borders_may_lack_what_was_asked_later(asked):
     (lambda: compiled([Path("a.so")], []), "1 libraries and 0 names"),
     (lambda: compiled([Path("a.so")], ["a"]), r"a\.so does not exist"),
     (lambda: chosen(["hcodd"]), "did you mean 'hcod'"),
+    (lambda: chosen(["hcod"], "python9"), "--python python9 is for entrants FILE"),
     (lambda: chosen(["no/such/file.py:Mine"]), "does not exist")])
 def test_an_entrant_that_is_not_there_is_refused(call, said):
     with pytest.raises(HierarchyError, match=said):
