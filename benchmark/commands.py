@@ -95,8 +95,9 @@ _add("resolvers", "Time every resolver on the reference problems.", "solve.resol
      seed=(Annotated[int | None, typer.Option(
          "--fresh", min=0, metavar="SEED", help="Also time fresh problems, from this seed on.")],
          None),
-     count=(Annotated[int, typer.Option(
-         "--count", min=1, metavar="N", help="Fresh problems of each family.")], 200),
+     count=(Annotated[int | None, typer.Option(
+         "--count", min=1, metavar="N", help="Fresh problems of each family. Default: 200.")],
+         None),
      families=(Family, None),
      resolvers=(Annotated[list[str] | None, typer.Option(
          "--resolver", metavar="NAME", help="Only this resolver, with its variants and backends, "

@@ -17,7 +17,7 @@ from benchmark.packages import OWN, Entrant
 from benchmark.process import CRASHED, HUNG, LEFT_OUT, Field
 from benchmark.solve import judge as judging
 from benchmark.solve import open as opened
-from benchmark.solve import views
+from benchmark.solve import resolvers, views
 from benchmark.solve.entrants import chosen, compiled
 from benchmark.worker import Repeats
 from hierarchy import Hierarchy, HierarchyError
@@ -191,6 +191,7 @@ def test_borders_may_lack_what_was_asked_later(asked):
     (lambda: compiled([Path("a.so")], ["a"]), r"a\.so does not exist"),
     (lambda: chosen(["hcodd"]), "did you mean 'hcod'"),
     (lambda: chosen(["hcod"], "python9"), "--python python9 is for entrants FILE"),
+    (lambda: resolvers.run(count=3), "--count is of fresh problems"),
     (lambda: chosen(["no/such/file.py:Mine"]), "does not exist")])
 def test_an_entrant_that_is_not_there_is_refused(call, said):
     with pytest.raises(HierarchyError, match=said):
