@@ -140,6 +140,8 @@ H = Hierarchy.from_levels([([[1.0, 0.0]], [-0.1], [0.1]), ([[1.0, 0.5]], [0.3])]
     (lambda: load("dual-arm", {"tasks": [{"kind": "pose", "rotation": [0.0, 0.0, 0.0, 1.0]}]}),
      "tasks.0.rotation: expected 3 entries, not 4, got [0.0,"),
     (lambda: load("ellipse", ["forces.least=1.0"]), '[forces] needs control.level = "torque"'),
+    (lambda: load("ellipse-velocity", ["limits={acceleration=9.0, torque=0.5}"]),
+     'limits.torque does not go with control.level = "velocity"'),
     (lambda: load("ellipse-set-based", ["tasks=[{kind='self-collision', rate=3.0}]"]),
      'tasks.0.rate = 3 does not go with control.stack = "set-based"'),
     (lambda: load("ellipse-set-based", ["tasks=[{kind='com', give=0.1}]"]),
