@@ -1,7 +1,7 @@
 # make demo    set up, run the main job, say where its report is
 # make test    set up, then lint, types, import rules and every test: what CI runs
 # make quick   the tests of less than a second, in under a minute: for while one works
-# make bench   time the resolvers, the control tick and the start, then all beside other packages
+# make bench   all that `hierarchy bench` measures, then other packages
 # make stress  a resolver on a million generated problems, every answer certified; half an hour
 # make reproduce  the studies and timings behind the documents, written into the pages
 # make docs    build the documentation, any warning an error, and say where it is

@@ -8,13 +8,14 @@ from typing import Annotated, Any
 
 import typer
 
-from scenarios.cli.options import AsJson, Out, Workers, output
+from scenarios.cli.options import AsJson, Out, Workers, output, refuse_given
 from scenarios.cli.terminal import shown
 
 _ACCURACY, _GROWTH = "solve.first_paper:accuracy", "solve.first_paper:growth"
 _STRICTNESS = "peers.moving:strictness"
 _USUAL = ("solve.resolvers", "tick", _ACCURACY, _GROWTH, _STRICTNESS, "start")
 _DAY = 86_400.0  # [s]
+_BESIDE = "cannot be combined with "
 _SCENES = {"ellipse": "peers.moving", "stand": "peers.standing"}
 
 Seconds = Annotated[float, typer.Option("--seconds", min=0.001, max=_DAY, metavar="S",
@@ -70,6 +71,8 @@ def main(ctx: typer.Context, out: Out = None) -> None:
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # before numpy is loaded: one core is timed
     if ctx.invoked_subcommand is None:
         _run(out, *_USUAL)
+    else:
+        refuse_given(ctx, f"comes after {ctx.invoked_subcommand}", "out")
 
 
 def _add(name: str, words: str, *modules: str, **options: tuple[Any, Any]) -> None:
@@ -92,8 +95,9 @@ _add("resolvers", "Time every resolver on the reference problems.", "solve.resol
      seed=(Annotated[int | None, typer.Option(
          "--fresh", min=0, metavar="SEED", help="Also time fresh problems, from this seed on.")],
          None),
-     count=(Annotated[int, typer.Option(
-         "--count", min=1, metavar="N", help="Fresh problems of each family.")], 200),
+     count=(Annotated[int | None, typer.Option(
+         "--count", min=1, metavar="N", help="Fresh problems of each family. Default: 200.")],
+         None),
      families=(Family, None),
      resolvers=(Annotated[list[str] | None, typer.Option(
          "--resolver", metavar="NAME", help="Only this resolver, with its variants and backends, "
@@ -111,11 +115,13 @@ _add("first-paper", "Repeat the first TPM paper: accuracy and growth.", _ACCURAC
 _add("batch", "Measure how many problems per second batches solve.", "batch",
      counts=(Annotated[list[int] | None, typer.Option(
          "--count", min=1, metavar="N", help="Problems in a batch. May be repeated.")], None),
-     seconds=(Seconds, 1.0))
+     seconds=(Annotated[float, typer.Option(
+         "--seconds", min=0.001, max=_DAY, metavar="S",
+         help="Time for each size of a batch, family and resolver.")], 1.0))
 
 
 @bench.command()
-def peers(install: Install = False,
+def peers(context: typer.Context, install: Install = False,
           scene: Annotated[str | None, typer.Option(
               "--scene", metavar="NAME", help="Only `ellipse`, inverse kinematics of an arm, or "
               "`stand`, inverse dynamics of a humanoid on two feet.")] = None,
@@ -128,11 +134,11 @@ def peers(install: Install = False,
     from benchmark.packages import PACKAGES
     from hierarchy.errors import check_name
 
-    if scene is not None:
-        check_name("scene", scene, _SCENES)
     if install:
+        refuse_given(context, _BESIDE + "--install", "scene", "out")
         return _installed(PACKAGES)
     if scene is not None:
+        check_name("scene", scene, _SCENES)
         return _run(out, _SCENES[scene])
     _run(out, *_SCENES.values())
     return 0
@@ -147,7 +153,7 @@ _add("ik", """Compare inverse kinematics with pink, mink and placo.
 
 
 @bench.command("open")
-def open_(family: Family = None,
+def open_(context: typer.Context, family: Family = None,
           entrants: Annotated[list[str] | None, typer.Option(
               "--entrant", metavar="LABEL", help="Only this entrant of the table, or FILE.py:CLASS "
               "for yours. May be repeated.")] = None,
@@ -191,10 +197,13 @@ def open_(family: Family = None,
     from scenarios.problems.families import family as named
 
     if install:
+        refuse_given(context, _BESIDE + "--install", *context.params.keys() - {"install"})
         return _installed((EMBODIK, HIGHS))
     more = compiled(library or [], name or [])
     table = more if check and more and not entrants else chosen(entrants or [], python, more)
     if check:
+        refuse_given(context, _BESIDE + "--check", "family", "fresh", "count", "public", "borders",
+                     "out")
         tried = opened.check(table, limit)
         tried.say()
         return int(tried.failed)
@@ -217,8 +226,9 @@ _add("stress", """Certify a resolver's answers to generated problems.
     What is not certified is proved right or wrong, and what fails is saved. Exit code 1 if an
     answer fails.
     """, "stress",
-     count=(Annotated[int, typer.Option(min=1, metavar="N", help="Number of problems.")],
-            1_000_000),
+     count=(Annotated[int, typer.Option(
+         min=1, metavar="N", help="Number of problems, rounded up to as many of each kind.")],
+         1_000_000),
      resolver=(Annotated[str, typer.Option(metavar="NAME", help="Resolver to test.")], "hcod"),
      kind=(Annotated[str, typer.Option(metavar="KIND", help="Kind of problems.")], "all"),
      first=(Annotated[int, typer.Option(min=0, max=2**53, metavar="SEED", help="First seed.")], 0),
@@ -226,7 +236,7 @@ _add("stress", """Certify a resolver's answers to generated problems.
          "--processes", min=1, metavar="N", help="Default: one for each core.")], None))
 
 
-def reproduce(names: Annotated[list[str] | None, typer.Argument(
+def reproduce(context: typer.Context, names: Annotated[list[str] | None, typer.Argument(
                   metavar="[NAME]...", help="`protocol`, the runs of docs/protocol.md, `fronts`, "
                   "tuned methods, or a page such as docs/results/problems.md for the commands in "
                   "it. Default: all.")] = None,
@@ -245,4 +255,6 @@ def reproduce(names: Annotated[list[str] | None, typer.Argument(
     """
     from benchmark.reproduce import whole
 
+    if fill:
+        refuse_given(context, _BESIDE + "--fill", *context.params.keys() - {"fill"})
     return whole.fill() if fill else whole.run(names or [], out, quick, workers, as_json)

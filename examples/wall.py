@@ -1,4 +1,4 @@
-"""An inequality of one's own: the elbow of an arm stays on its side of a wall.
+"""An inequality of your own: the elbow of an arm stays on its side of a wall.
 
 Levels: joint limits > `Behind`, written here > the hand follows a circle that draws the elbow out.
 Beside it: the same circle without the wall.

@@ -30,8 +30,8 @@ def explain(h: Hierarchy, resolution: Resolution, tolerance: float = 1e-9,
     level, with them the largest missed inequalities of a level are named too. `units` of the m rows
     are written behind what a row gives. Of a hierarchy with rows whose sides cross, or of a
     numerical failure, nothing else is said. Raises a HierarchyError unless the resolution is from
-    `hcod`, the only resolver that reports the state of each row, and if its rows, names or units
-    are not m.
+    `hcod`, the only resolver that reports which level each row holds back, and if its rows, names
+    or units are not m.
     """
     expect("explain: h", h, Hierarchy, "make one with Hierarchy.from_levels([(A, b), ...])")
     number("explain: tolerance", tolerance, 0.0)
@@ -46,7 +46,7 @@ def explain(h: Hierarchy, resolution: Resolution, tolerance: float = 1e-9,
             raise HierarchyError(f"explain: {len(given)} {called} for {h.m} rows")
     if not isinstance(resolution, ActiveSetResolution):
         raise HierarchyError("explain needs a resolution of hcod: other resolvers do not report "
-                             "which rows are active")
+                             "which level each row holds back")
     if h.giving and len(resolution.active) < h.m:  # a witness was not found
         h = h.upper_part(h.giving[-1] + 1)
     shaped("explain: active", resolution.active, (h.m,))

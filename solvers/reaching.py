@@ -45,8 +45,8 @@ class Reached:
 
     q : (nq,) the configuration. met : whether the tasks that decide are met there.
     errors : norm of the error of each task, by name; of an inequality, of what is missed.
-    verdict : "reached", or "unreachable: nearest found, held back by ..." with joint limits, tasks
-        above and singular directions by name.
+    verdict : "reached", or "unreachable: nearest found, ..." with the tasks that are missed and
+        the joint limits, tasks above and singular directions that hold them back.
     iterations, starts : what it took. status : that of the last solve.
     """
 

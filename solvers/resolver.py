@@ -311,13 +311,13 @@ def register_variant(name: str, resolver: str, **settings: Any) -> None:
 
 
 def variants() -> dict[str, str]:
-    """Return what resolvers of `names` with settings of their own stand for, by name, sorted."""
+    """Return the spec of each named variant, such as "tpm-published", sorted by name."""
     return {name: ":".join((resolver, *(f"{key}={value}" for key, value in settings.items())))
             for name, (resolver, settings) in sorted(_VARIANTS.items())}
 
 
 def names() -> tuple[str, ...]:
-    """Return the names of all resolvers that a hierarchy alone is enough for, sorted."""
+    """Return the names of all resolvers that need nothing beside a hierarchy, sorted."""
     return tuple(sorted(name for name, kind in _REGISTRY.items() if kind.handles != "activations"))
 
 

@@ -20,9 +20,9 @@ from benchmark.packages import Entrant
 from benchmark.peers.adapters.hierarchy import arm
 from benchmark.peers.compare import ABOUT, TICK, TURN_LIMIT, Ask, Log, joined, measure, times, turns
 from benchmark.peers.scenes import Arm
+from benchmark.peers.urdf import urdf
 from benchmark.process import START_LIMIT, EndedError
 from benchmark.report import Column, Report, Row, Section, Table, power, text, whole, yes
-from benchmark.urdf import urdf
 from hierarchy import Hierarchy, Robot, State
 from hierarchy.paths import Still
 from hierarchy.tasks import Position

@@ -15,8 +15,8 @@ from benchmark.packages import OWN, PLACO, TSID
 from benchmark.peers.adapters.hierarchy import TASKS, robot_of, stack_of
 from benchmark.peers.compare import ABOUT, TICK, Log, measure, times, turns
 from benchmark.peers.scenes import Stand
+from benchmark.peers.urdf import urdf
 from benchmark.report import Column, Report, Row, Section, Table, power, whole
-from benchmark.urdf import urdf
 from hierarchy import Robot, Stack, State
 from hierarchy.paths import Ellipse, Still
 from hierarchy.problem import Array

@@ -36,8 +36,8 @@ def run(names: list[str], out: Path, quick: bool = False, workers: int | None = 
     for name in names:
         check_name("page", name, known)
     asked = [name for name in known if name in names or not names]
-    refuse(quick and NAME not in asked, f"--quick makes runs, and {', '.join(asked)} has the "
-           "output of commands; leave --quick out")
+    refuse(quick and NAME not in asked, f"--quick makes the first seed of {NAME}, which is not "
+           "asked for; leave --quick out")
     make_folder(out)
     rows, lacking, failed = None, list[str](), list[str]()
     with interruptible("the same command continues from here", out):

@@ -84,7 +84,8 @@ def chosen(labels: Sequence[str], python: str = "", more: Sequence[Entrant] = ()
     Raises
     ------
     UnknownNameError : a label that is not in the table.
-    HierarchyError : a file that does not exist, or a name that another entrant has.
+    HierarchyError : a file that does not exist, a name that another entrant has, or an interpreter
+        for nobody.
     """
     known = {one.label: one for one in (*ENTRANTS, *more)}
     found, own = [], []
@@ -99,6 +100,7 @@ def chosen(labels: Sequence[str], python: str = "", more: Sequence[Entrant] = ()
             raise UnknownNameError("entrant", label, list(known))
         else:
             found.append(known[label])
+    refuse(python and not own, f"--python {python} is for entrants FILE.py:CLASS; none is asked")
     names = Counter(slug(one.label) for one in (*ENTRANTS, *more, *own))  # of files of rows
     twice = [name for name, count in names.items() if count > 1]
     refuse(twice, f"two entrants are named {', '.join(twice)}; give each a name of its own")

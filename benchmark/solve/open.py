@@ -104,6 +104,8 @@ def run(folder: Path, families: Sequence[Family], entrants: Sequence[Entrant],
         if not file.is_file():
             tell(f"{family.name}, seed {seed}: problems and their proofs")
             export(family, seed, count, True, store.problems)
+        elif count not in (None, there := len(read(file).problems)):
+            tell(f"{file.stem} has {there} problems, not {count}: they stay as they are")
         left[file] = [one.label for one in entrants if not store.file_of(one.label, file).is_file()]
     store.note("limits", store.notes("limits") | {one.label: one.limits for one in entrants})
     with Field([one for one in entrants if any(one.label in some for some in left.values())],

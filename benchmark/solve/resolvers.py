@@ -16,7 +16,7 @@ from benchmark.solve.interface import Questions
 from benchmark.solve.judge import RIGHT, by, judged, summary
 from benchmark.timing import machine, one_core
 from benchmark.worker import Repeats, load
-from hierarchy.errors import check_name
+from hierarchy.errors import check_name, refuse
 from scenarios.problems import recorded
 from scenarios.problems.recorded import FAMILIES
 from solvers import certify, names
@@ -24,6 +24,7 @@ from solvers.qp.backends import installed
 
 KNOWN, FRESH = "known", "fresh"
 _MOST = 200      # times of one problem
+_MADE = 200      # fresh problems of a family
 
 NOTES = f"""\
 Times of one call from Python, in microseconds; iter: median iterations, each resolver's own. \
@@ -61,13 +62,15 @@ def field(wanted: Sequence[str] | None = None) -> tuple[list[Entrant], dict[str,
 
 
 def run(seconds: float = 0.5, families: Sequence[str] | None = None, seed: int | None = None,
-        count: int = 200, resolvers: Sequence[str] | None = None) -> Report:
+        count: int | None = None, resolvers: Sequence[str] | None = None) -> Report:
     """Time resolvers by name, None for all, on every family; check every answer.
 
     They take turns problem by problem, so that noise of the machine affects all equally, for about
     `seconds` [s] each in each family. seed, count : of the first fresh problem of a family, None
-    for stored problems only, and their number. Raises UnknownNameError.
+    for stored problems only, and their number, 200 by default. Raises UnknownNameError, and
+    HierarchyError for a count without a seed.
     """
+    refuse(seed is None and count is not None, "--count is of fresh problems: give --fresh too")
     families = families or FAMILIES
     for name in families:
         check_name("family", name, FAMILIES)
@@ -78,7 +81,7 @@ def run(seconds: float = 0.5, families: Sequence[str] | None = None, seed: int |
         for name in families:
             tell(f"{name}, {origin} ...")
             problems = (recorded.family(name) if seed is None or origin == KNOWN
-                        else recorded.fresh(name, seed, count))
+                        else recorded.fresh(name, seed, count or _MADE))
             some += [{"family": name, "origin": origin, **row}
                      for row in _measured(name, problems, entrants, seconds)]
         sections.append(_section(some, origin))

@@ -1,4 +1,4 @@
-"""A small picture and the main numbers of every shipped scenario, for docs/gallery.md.
+"""A small picture of every shipped scenario, for docs/gallery.md.
 
 `python -m benchmark.studies.gallery` runs all scenarios, `... gallery NAME NAME` only those;
 `--documents` draws the pictures of runs in the other documents.
@@ -19,8 +19,6 @@ from scenarios.draw.figures.letter import write_all
 from scenarios.draw.figures.picture import picture
 from scenarios.files import make_folder, write_bytes
 from scenarios.loop.simulation import uninterrupted
-from scenarios.measure.metrics import measure
-from scenarios.recording.recording import Recording
 
 FOLDER = Path("docs/images/gallery")  # from the root of the repository
 DOCUMENTS = {
@@ -31,9 +29,6 @@ DOCUMENTS = {
 """For each scenario the pictures in `docs/images`, by the figure that they are."""
 
 _COLOURS = 255  # of the palette: enough for flat drawings, and half the bytes
-_NUMBERS = ("position_error_rms_settled", "cone_violation_max", "body_distance_min",
-            "ee_distance_min", "joint_limit_excess", "speed_max", "acceleration_max",
-            "stack_changes", "ticks_not_solved")
 
 
 def main(scenarios: Annotated[list[str] | None, typer.Argument()] = None, out: Path = FOLDER,
@@ -44,7 +39,7 @@ def main(scenarios: Annotated[list[str] | None, typer.Argument()] = None, out: P
         with matplotlib.rc_context(drawing.present().settings):
             picture({name: recording}).savefig(drawn, format="png", dpi=130, facecolor="white")
         _write(drawn, make_folder(out) / f"{name}.png")
-        print(f"{name}: {'; '.join(_main_numbers(recording))}", flush=True)
+        print(f"{name}.png", flush=True)
     for name, pictures in DOCUMENTS.items() if documents else ():
         with tempfile.TemporaryDirectory() as folder:
             write_all([uninterrupted(load(name))], Path(folder))
@@ -59,13 +54,6 @@ def _write(drawn: io.BytesIO | Path, path: Path) -> None:
     with Image.open(drawn) as image:
         image.convert("RGB").quantize(_COLOURS).save(small, format="png", optimize=True)
     write_bytes(path, small.getvalue())
-
-
-def _main_numbers(recording: Recording) -> list[str]:
-    """Return the most important metrics of a run, as text with units."""
-    return [f"{metric.label} {metric.shown()} {metric.shown_unit}".strip()
-            for name, metric in measure(recording).items() if metric.value is not None
-            and (name in _NUMBERS or (name.startswith("task_") and name.endswith("_max_settled")))]
 
 
 if __name__ == "__main__":

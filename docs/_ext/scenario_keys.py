@@ -49,10 +49,13 @@ def _single(writer, place, section):
 
 def _several(writer, place, group):
     """Yield what all kinds of a place have, then each kind."""
-    from scenarios.config.reference import keys_of, kinds_of
+    from scenarios.config.reference import Scenario, keys_of, kinds_of, tag_at
 
     kinds = {kinds_of(one)[0]: one for one in group if kinds_of(one)}
-    yield f"- **kind**: one of these{'' if len(kinds) == len(group) else ', or of a plug-in'}"
+    _, default = tag_at(Scenario, place.strip("[]").split("."))
+    default = f' (`"{default}"`)' if default else "\\*"
+    plugin = "" if len(kinds) == len(group) else ", or of a plug-in"
+    yield f"- **kind**{default}: one of these{plugin}"
     common = set.intersection(*({*map(_same, keys_of(one))} for one in kinds.values()))
     yield from writer.entries((place,), (
         key for key in keys_of(group[0]) if _same(key) in common))

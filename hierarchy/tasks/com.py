@@ -18,7 +18,7 @@ from hierarchy.task import NamedRows
 
 
 @dataclass(frozen=True)
-class CentreOfMass(Measured):
+class CentreOfMass(NamedRows, Measured):
     """Move the robot's centre of mass along `path` in the chosen world axes [m].
 
     `axes` are some of 0, 1, 2 for x, y, z in increasing order, one row per axis: (0, 1) leaves the
@@ -42,9 +42,9 @@ class CentreOfMass(Measured):
         self.refuse(not self.robot.masses.sum() > 0.0, f"robot {self.robot.name!r} has no masses")
 
     @property
-    def dimension(self) -> int:
-        """One row per axis."""
-        return len(self.axes)
+    def row_names(self) -> tuple[str, ...]:
+        """The axes of the world."""
+        return tuple("xyz"[axis] for axis in self.columns)
 
     def measure(self, state: State) -> Measure:
         """See `Measured.measure`."""

@@ -13,7 +13,7 @@ from hierarchy.paths import Path
 from hierarchy.problem import Array
 from hierarchy.robot import Frame
 from hierarchy.state import State
-from hierarchy.task import Level, Rows, Writer, Written
+from hierarchy.task import Level, NamedRows, Rows, Writer, Written
 
 _NOTHING_SEEN = Measurement(0).arrays
 
@@ -58,7 +58,7 @@ class Position(Measured):
 
 
 @dataclass(frozen=True)
-class Along(Written):
+class Along(NamedRows, Written):
     """The rows of a position task along `directions` (m, 3) of the world, m = 1, 2 or 3 [m].
 
     A hand that slides on a table is moved along two of them and pushes along the third. The gains
@@ -81,9 +81,11 @@ class Along(Written):
                     f"directions {self.directions!r} are not of length one and orthogonal, (m, 3)")
 
     @property
-    def dimension(self) -> int:
-        """One row per direction."""
-        return len(self.directions)
+    def row_names(self) -> tuple[str, ...]:
+        """The directions: an axis of the world by its name."""
+        axes = {(1.0, 0.0, 0.0): "x", (0.0, 1.0, 0.0): "y", (0.0, 0.0, 1.0): "z"}
+        return tuple(axes.get(tuple(one), f"along {list(one)}") for one in
+                     np.array(self.directions, dtype=float).tolist())
 
     def error(self, state: State) -> Array:
         """Distance to the path along the directions (m,) [m]."""

@@ -1,8 +1,8 @@
 """The two errors in the letter's published code, so that its figures can be reproduced.
 
-Found by central differences (see the reproduction notes): the control-point Jacobians run from the
-other end of each link than the points do, and entry (2, 1) of the upper-arm Jacobian reads
--l c1 c2 instead of -l c1 s2. Only the KUKA LWR of the letter has these Jacobians.
+Found by central differences: the control-point Jacobians run from the other end of each link than
+the points do, and entry (2, 1) of the upper-arm Jacobian reads -l c1 c2 instead of -l c1 s2. Only
+the KUKA LWR of the letter has these Jacobians.
 """
 
 from dataclasses import dataclass
@@ -11,10 +11,12 @@ from typing import Any
 import numpy as np
 
 from hierarchy import HierarchyError, State
+from hierarchy.errors import refuse
 from hierarchy.jit.sources import Kernel
 from hierarchy.kinematics import row_times, write_point_jacobian
 from hierarchy.measured import measured
 from hierarchy.problem import Array
+from hierarchy.robots import KUKA_LWR
 from hierarchy.task import Level, Rows, Writer
 from hierarchy.tasks import Avoidance
 
@@ -31,9 +33,9 @@ class PublishedAvoidance(Avoidance):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        if len(self.points) != 8:
-            raise HierarchyError(f"avoidance.jacobian = 'published' needs the letter's eight "
-                                 f"control points, the robot has {len(self.points)}")
+        points = [(f"joint_{one.joint}", tuple(one.offset)) for one in self.points]
+        refuse(points != [*KUKA_LWR.control_points], "avoidance.jacobian = 'published' needs the "
+               f"control points of the letter's arm, robot.model = {KUKA_LWR.name!r}")
 
     def measure(self, state: State) -> tuple[Kernel, Any]:
         """See `Measured.measure`: J_c or r^T J_c with the errors, and the repulsion."""

@@ -92,7 +92,8 @@ def list_(plugin: opt.Plugins = None, as_json: opt.AsJson = False) -> None:
 
 
 @app.command()
-def library(out: Annotated[Path, opt.output("Folder of the library: new or empty, or an existing "
+def library(context: typer.Context,
+            out: Annotated[Path, opt.output("Folder of the library: new or empty, or an existing "
                                             "one with --check.")],
             resolvers: Annotated[str, typer.Option(
                 "--resolvers", metavar="NAMES", help="Of hcod, tpm, recursive, sns, merged.")
@@ -117,6 +118,7 @@ def library(out: Annotated[Path, opt.output("Folder of the library: new or empty
     from solvers.library import differs, write
 
     if check:
+        opt.refuse_given(context, "cannot be combined with --check", "resolvers", "target", "fix")
         difference = differs(out)
         if as_json:
             print_json({"folder": shown(out), "same": not difference, "difference": difference})

@@ -52,6 +52,14 @@ def output(help: str, metavar: str = "FOLDER") -> Any:
     return typer.Option("--out", metavar=metavar, help=help, parser=_given)
 
 
+def refuse_given(context: typer.Context, why: str, *names: str) -> None:
+    """Raise BadParameter if the command line has options that would have no effect, and say why."""
+    if given := ["/".join((*one.opts, *one.secondary_opts)) for one in context.command.params
+                 if one.name in names
+                 and "COMMANDLINE" in str(context.get_parameter_source(one.name))]:
+        raise typer.BadParameter(why, param_hint=", ".join(given))
+
+
 def _part(text: str) -> tuple[int, int]:
     i, slash, count = text.partition("/")
     if not (slash and i.isdecimal() and count.isdecimal()):

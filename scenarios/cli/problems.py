@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from scenarios.cli.options import AsJson, output
+from scenarios.cli.options import AsJson, output, refuse_given
 from scenarios.cli.terminal import bar, print_files, print_json, print_lists, shown
 
 if TYPE_CHECKING:
@@ -43,15 +43,17 @@ def list_(as_json: AsJson = False) -> None:
 
 
 @problems.command()
-def show(problem: Annotated[str, typer.Argument(metavar="FAMILY_OR_FILE",
+def show(context: typer.Context,
+         problem: Annotated[str, typer.Argument(metavar="FAMILY_OR_FILE",
                                                 help="Name of a family, or a file.")],
          seed: Seed = 0, count: Count = None, as_json: AsJson = False) -> None:
     """Describe a family or a file: sizes, rows, answers."""
     from scenarios.problems.families import family
     from solvers.problems.files import read
 
-    said = _about(read(problem) if problem.endswith(".npz") else
-                  family(problem).half(seed, count))
+    if is_file := problem.endswith(".npz"):
+        refuse_given(context, "is for a family, not for a file", "seed", "count")
+    said = _about(read(problem) if is_file else family(problem).half(seed, count))
     if as_json:
         return print_json(said)
     width = max(map(len, said))

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
 
 @opt.app.command()
-def run(scenario: Annotated[str, typer.Argument(
+def run(context: typer.Context, scenario: Annotated[str, typer.Argument(
             help="Name of a scenario, or a scenario file.",
             autocompletion=opt.names_of("scenarios"))],
         resolver: Annotated[str | None, typer.Option(
@@ -38,19 +38,18 @@ def run(scenario: Annotated[str, typer.Argument(
             ] = False, as_json: opt.AsJson = False,
         live: Annotated[bool, typer.Option(
             "--live", help="Show the run in the browser and change it interactively.")] = False,
-        speed: Annotated[float | None, typer.Option(
-            "--speed", metavar="X", min=0.01, max=100.0,
-            help="With --live: real-time factor. Default: 1.")] = None,
+        speed: Annotated[float, typer.Option(
+            "--speed", metavar="X", min=0.01, max=100.0, help="With --live: real-time factor.")
+            ] = 1.0,
         wait: Annotated[bool, typer.Option(
             "--wait/--no-wait", help="With --live: start when a browser has opened the page, or "
             "at once.")] = True,
         port: opt.Port = opt.PORT, browser: opt.Browser = True) -> int:
     """Run a scenario, measure it, and save the run."""
-    if live and (certify or figures or as_json):
-        raise typer.BadParameter("cannot be combined with --certify, --figures or --json",
-                                 param_hint="--live")
-    if speed is not None and not live:
-        raise typer.BadParameter("needs --live", param_hint="--speed")
+    if live:
+        opt.refuse_given(context, "cannot be combined with --live", "certify", "figures", "as_json")
+    else:
+        opt.refuse_given(context, "needs --live", "speed", "wait", "port", "browser")
     chosen = opt.loaded(scenario, changes, duration)
     if resolver is not None:
         chosen = chosen.with_resolver(resolver)
@@ -61,7 +60,7 @@ def run(scenario: Annotated[str, typer.Argument(
     if live:
         from scenarios.cli.shown import show_live
 
-        return show_live(chosen, folder, port, speed or 1.0, browser, wait)
+        return show_live(chosen, folder, port, speed, browser, wait)
     return _run(chosen, folder, certify, figures, as_json)
 
 
@@ -100,15 +99,18 @@ def _run(scenario: Scenario, folder: Path, certify: bool, figures: bool, as_json
 
 
 @opt.app.command()
-def compare(scenarios: Annotated[list[str], typer.Argument(
+def compare(context: typer.Context, scenarios: Annotated[list[str], typer.Argument(
                 help="Names of scenarios or groups, or scenario files.",
                 autocompletion=opt.names_of("scenarios", "groups"))],
             resolvers: Annotated[str | None, typer.Option(
                 "--resolvers", metavar="SPEC,SPEC,...", autocompletion=opt.complete_resolvers,
                 help="Resolvers: name, or name:setting=value; or own, that of each scenario. "
-                     "Default: all suitable ones; own for a group.")] = None,
+                     "Default: a selection of suitable ones; own for a group.")] = None,
             changes: opt.Changes = None, plugin: opt.Plugins = None, duration: opt.Duration = None,
-            out: opt.Out = None, starts: Annotated[int | None, typer.Option(
+            out: Annotated[Path | None, opt.output(
+                "Output folder, new or empty; with --starts also one to resume. Default: a new "
+                "folder in runs/; with --starts runs/starts-NAME.")] = None,
+            starts: Annotated[int | None, typer.Option(
                 "--starts", metavar="N", min=2, help="Compare over N starts sampled from each "
                 "scenario's [variation].")] = None,
             seed: Annotated[int, typer.Option(
@@ -120,8 +122,10 @@ def compare(scenarios: Annotated[list[str], typer.Argument(
     With --starts every resolver gets the same sampled starts, and the report gives statistics; run
     the same command again to resume an interrupted comparison.
     """
-    if starts is None and (seed or scheduler or part):
-        raise typer.BadParameter("needs --starts", param_hint="--seed, --scheduler, --part")
+    if starts is None:
+        opt.refuse_given(context, "needs --starts", "seed", "scheduler", "part")
+    if scheduler:
+        opt.refuse_given(context, "cannot be combined with --scheduler", "workers")
     from scenarios.config import members, shipped_groups
     from scenarios.config.scenario import OWN
     from scenarios.files import in_runs, next_free
@@ -171,7 +175,8 @@ def _compare(scenarios: list[Scenario], resolvers: list[str] | None, folder: Pat
 
 
 @opt.app.command()
-def sweep(file: Annotated[str, typer.Argument(help="Name of a sweep, or a sweep file.",
+def sweep(context: typer.Context,
+          file: Annotated[str, typer.Argument(help="Name of a sweep, or a sweep file.",
                                               autocompletion=opt.names_of("sweeps"))],
           out: Annotated[Path | None, opt.output(
               "Output folder, new or of a sweep to resume. Default: runs/sweep-NAME.")] = None,
@@ -181,6 +186,8 @@ def sweep(file: Annotated[str, typer.Argument(help="Name of a sweep, or a sweep 
 
     Run the same command again to resume an interrupted sweep.
     """
+    if scheduler:
+        opt.refuse_given(context, "cannot be combined with --scheduler", "workers")
     from scenarios.files import in_runs
     from scenarios.results.plan import load_sweep
     from scenarios.results.sampled import Workers

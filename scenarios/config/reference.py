@@ -15,7 +15,7 @@ from typing import Any, NamedTuple
 
 from scenarios.config.scenario import Scenario
 from scenarios.config.sections import Section, Unit, kinds_of
-from scenarios.config.validation import parts_of, sections_at
+from scenarios.config.validation import parts_of, sections_at, tag_at
 
 _BOUNDS = (("minimum", "≥"), ("exclusiveMinimum", ">"), ("maximum", "≤"), ("exclusiveMaximum", "<"))
 _TYPES = {"string": "string", "boolean": "boolean", "integer": "integer", "object": "table"}
@@ -66,6 +66,8 @@ def explained(dotted: str) -> list[str]:
     Entries of a list have numbers, or none, as in `avoidance.obstacles.path`.
     """
     path = [part for part in dotted.split(".") if not part.isdigit() and part != "*"]
+    if path[-1:] == ["kind"] and (kinds := _kinds(path[:-1])):
+        return kinds
     found = list(dict.fromkeys(sections_at(Scenario, path)))
     said: dict[tuple[str, ...], list[str]] = {}  # sections by what they say of the key
     for owner in dict.fromkeys(sections_at(Scenario, path[:-1])):
@@ -85,6 +87,20 @@ def explained_kind(dotted: str) -> list[str]:
     return [line for place, section in sections()
             if kind in kinds_of(section) and f".{place.strip('[]')}".endswith(above)
             for line in _whole(section, place)]
+
+
+def _kinds(path: list[str]) -> list[str]:
+    """Return the kinds of a section, and what each of them is; none if there is one."""
+    tag, default = tag_at(Scenario, path) or ("", None)
+    if tag != "kind":
+        return []
+    said = f"default {json.dumps(default)}" if default else "required"
+    lines = [_bracketed(path), f"  kind: {said}"]
+    for section in dict.fromkeys(sections_at(Scenario, path)):
+        first = (inspect.getdoc(section) or "").partition("\n")[0]
+        lines += [fill(f"{json.dumps(kind)}: {first}", 88, initial_indent="      ",
+                       subsequent_indent="        ") for kind in kinds_of(section)]
+    return lines
 
 
 def _whole(section: type[Section], place: str) -> Iterator[str]:
@@ -109,8 +125,9 @@ def _bracketed(path: list[str]) -> str:
 def places_of(name: str | None = None) -> list[str]:
     """Return the dotted keys with a last part, or all; of those in several sections the first."""
     return list(dict.fromkeys(
-        f"{place.strip('[]')}.{key.name}".lstrip(".") for place, section in sections()
-        for key in keys_of(section) if name in (None, key.name)))
+        f"{place.strip('[]')}.{key}".lstrip(".") for place, section in sections()
+        for key in (*["kind"] * (len(kinds_of(section)) == 1),
+                    *(one.name for one in keys_of(section))) if name in (None, key)))
 
 
 def sections() -> Iterator[tuple[str, type[Section]]]:

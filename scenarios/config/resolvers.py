@@ -13,7 +13,7 @@ from solvers.resolver import Handles
 if TYPE_CHECKING:
     from scenarios.config.scenario import Scenario
 
-# The methods that the letter compares, and ours; for inequalities all resolvers that accept them.
+# The methods that the letter compares, and ours, by the rows that a scenario has.
 DEFAULT_RESOLVERS: dict[Handles, tuple[str, ...]] = {
     "equalities": ("tpm-published", "tpm", "recursive", "augmented", "hqp",
                    "hqp:backend=osqp", "hqp:backend=daqp", "hcod"),

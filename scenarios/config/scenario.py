@@ -131,7 +131,7 @@ class Scenario(Section):
             yield ('limits.place = "guard" does not go with control.level = "torque": torques are '
                    "clipped, and joints are not")
         if self.limits and self.limits.torque and self.control.level == "velocity":
-            yield "limits.torque needs control.level = \"acceleration\""
+            yield 'limits.torque does not go with control.level = "velocity"'
         if self.limits and self.limits.torque_step and not clipped:
             yield "limits.torque_step needs control.level = \"torque\""
 

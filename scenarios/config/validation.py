@@ -16,7 +16,7 @@ _USUAL = {  # sizes that are not doubted, by unit
     "m": (0.0, 10.0, "lengths are in metres, not in millimetres"),
     "rad": (0.0, tau, "angles are in radians, not in degrees"),
     "rad or m": (0.0, tau, "joint angles are in radians"),
-    "deg": (1.0, inf, "cones are in degrees; all other angles are in radians")}
+    "deg": (1.0, inf, "cones and pushes are in degrees; all other angles are in radians")}
 _QUOTED = re.compile(r"'([^']*)'")
 _UNIONS = ("constrained-float", "float", "str")  # what pydantic calls the parts of one in a key
 

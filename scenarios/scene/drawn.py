@@ -126,7 +126,8 @@ def _frames(recording: Recording, rate: float) -> NDArray[np.int64]:
     finite = np.flatnonzero(np.isfinite(recording.get("true_q", recording["q"])).all(axis=1))
     refuse(not finite.size, "the recording has no tick: there is nothing to draw")
     t = recording["t"][finite]
-    wanted = np.append(np.arange(t[0], t[-1], 1.0 / rate), t[-1])
+    step = max(1.0 / rate, recording.scenario.control.period)
+    wanted = np.append(np.arange(t[0], t[-1], step), t[-1])
     after = np.clip(np.searchsorted(t, wanted), 1, max(len(t) - 1, 1)) if len(t) > 1 else [0]
     before = np.maximum(np.asarray(after) - 1, 0)
     nearer = np.where(wanted - t[before] <= t[after] - wanted, before, after)

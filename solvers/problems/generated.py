@@ -49,8 +49,7 @@ class Recipe:
     largest to the smallest norm in a level, `angles` [rad] those of `near_parallel` rows. Chances
     of a structure: empty, rank_lost, linked (rows in the span of levels above), simple_bounds,
     zero_rows, duplicates, near_parallel; of a whole problem: conflicting, reference. Shares of the
-    inequalities: ties (a side exactly at x*), one_sided, sideless. docs/problem-files.md
-    defines each.
+    inequalities: ties (a side exactly at x*), one_sided, sideless.
 
     Raises HierarchyError for an empty range, a chance outside 0..1, or another type.
     """

@@ -66,8 +66,9 @@ def backend_of(name: str) -> Backend:
     check_name("backend of hqp", name, BACKENDS)
     backend = BACKENDS[name]
     if not installed(name):
-        where = "task-hierarchy[scenarios]" if backend.core else "task-hierarchy[qp]"
-        raise HierarchyError(f"hqp: backend {name!r} is not installed; pip install {where}")
+        extra = "scenarios" if backend.core else "qp"
+        raise HierarchyError(f"hqp: backend {name!r} is not installed; "
+                             f"pip install 'task-hierarchy[{extra}]'")
     return backend
 
 

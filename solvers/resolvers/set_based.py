@@ -21,7 +21,7 @@ class SetBased(Around):
     """The modes of set-based tasks over the equality stacks that `inner` resolves.
 
     A row with one side is the extended tangent cone of a task at the bound of its set or beyond
-    (`hierarchy.tasks.TangentCone`): its rate must not pass the side. A mode freezes some of these
+    (`TangentCone`): its rate must not pass the side. A mode freezes some of these
     rows as equalities and ignores the others; docs/theory/set-based.md says which mode is taken,
     and where this differs from the source.
 

@@ -17,7 +17,7 @@ from benchmark.packages import OWN, Entrant
 from benchmark.process import CRASHED, HUNG, LEFT_OUT, Field
 from benchmark.solve import judge as judging
 from benchmark.solve import open as opened
-from benchmark.solve import views
+from benchmark.solve import resolvers, views
 from benchmark.solve.entrants import chosen, compiled
 from benchmark.worker import Repeats
 from hierarchy import Hierarchy, HierarchyError
@@ -190,6 +190,8 @@ def test_borders_may_lack_what_was_asked_later(asked):
     (lambda: compiled([Path("a.so")], []), "1 libraries and 0 names"),
     (lambda: compiled([Path("a.so")], ["a"]), r"a\.so does not exist"),
     (lambda: chosen(["hcodd"]), "did you mean 'hcod'"),
+    (lambda: chosen(["hcod"], "python9"), "--python python9 is for entrants FILE"),
+    (lambda: resolvers.run(count=3), "--count is of fresh problems"),
     (lambda: chosen(["no/such/file.py:Mine"]), "does not exist")])
 def test_an_entrant_that_is_not_there_is_refused(call, said):
     with pytest.raises(HierarchyError, match=said):
@@ -208,7 +210,8 @@ def test_the_command_runs_continues_and_writes_its_page(tmp_path, command, monke
     assert len(first) == 8  # four files of problems, four of rows
     assert len(list(out.glob("borders/*/*.npz"))) == 4 * 8
     (out / "missing.json").write_text('{"absent": "not installed", "Moody": "not installed"}')
-    said = command(*line, "--entrant", f"{HELPERS / 'fake_entrants.py'}:Moody")
+    said = command(*line, "--count", 4, "--entrant", f"{HELPERS / 'fake_entrants.py'}:Moody")
+    assert "integers-fresh-9 has 3 problems, not 4: they stay as they are" in said.err
     missing = json.loads((out / "missing.json").read_text())
     assert (missing["absent"], "Moody" in missing) == ("not installed", False)
     assert first.items() <= {file: file.stat().st_mtime_ns for file in out.glob("*/*.*")}.items()

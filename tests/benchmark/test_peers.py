@@ -13,10 +13,10 @@ from benchmark.peers import reaching, standing
 from benchmark.peers.adapters.hierarchy import stand
 from benchmark.peers.compare import joined
 from benchmark.peers.moving import ENTRANTS, QUESTIONS, START, make_scenes, run
+from benchmark.peers.urdf import urdf
 from benchmark.process import Field
 from benchmark.solve import entrants as solvers_
 from benchmark.solve import open as solve
-from benchmark.urdf import urdf
 from benchmark.worker import load
 from hierarchy import Hierarchy, Robot, State
 from hierarchy.paths import Still

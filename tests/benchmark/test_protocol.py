@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from refusals import refused
 
 from benchmark.reproduce import blocks, fronts, pages, protocol, verdicts, whole
 from hierarchy.errors import HierarchyError
@@ -151,6 +152,8 @@ def test_reproduce_ends_with_1_where_a_command_ends_with_an_error(tmp_path, monk
     monkeypatch.setattr(pages, "ROOT", tmp_path)
     (tmp_path / "README.md").write_text(page("python -c 'exit(3)'"))
     assert whole.run(["README.md"], tmp_path / "out") == 1
+    refused("--quick makes the first seed of protocol, which is not asked for", whole.run,
+            ["fronts"], tmp_path / "out", quick=True)
 
 
 BENCH = """\

@@ -263,6 +263,9 @@ def test_insert_remove_swap_and_reorder_by_name():
 def test_rows_are_those_of_the_tasks_named_in_order_and_written_into_the_same_buffers():
     s = Stack([TASKS["position"], tasks.LookAt(FRAME, (0.3, 0.3, 0.6))])
     assert (s.row_names(), s.row_names(("look-at",))) == (("x", "y", "z", "x", "y"), ("x", "y"))
+    along = tasks.Along(TASKS["position"], [[0, 0, 1], [0.6, 0.8, 0]])
+    assert along.row_names == ("z", "along [0.6, 0.8, 0.0]")
+    assert TASKS["centre of mass, x and z"].row_names == ("x", "z")
     state = state_at(Q, V)
     h = stack().hierarchy(state, ("avoidance", "position"))
     assert (h.names, h.sizes.tolist()) == (("avoidance", "position"), [3, 3])

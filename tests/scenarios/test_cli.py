@@ -209,6 +209,23 @@ def test_an_error_names_the_one_file_of_a_command_once(text, files, said):
     assert _with_its_file(text, ["run", *files]) == said
 
 
+@pytest.mark.parametrize(("words", "options", "why"), [
+    ("run ellipse --no-wait --port 8081", "--wait/--no-wait, --port", "needs --live"),
+    ("run ellipse --live --json", "--json", "cannot be combined with --live"),
+    ("compare ellipse --seed 0 --part 1/2", "--seed, --part", "needs --starts"),
+    ("sweep ellipse-starts --scheduler a:1 --workers 2", "--workers",
+     "cannot be combined with --scheduler"),
+    ("library --check --fix 7 5 3 --out c", "--fix", "cannot be combined with --check"),
+    ("problems show a.npz --count 2", "--count", "is for a family, not for a file"),
+    ("bench --out b tick", "--out", "comes after tick"),
+    ("bench peers --install --scene stand", "--scene", "cannot be combined with --install"),
+    ("bench open --install --check", "--check", "cannot be combined with --install"),
+    ("bench open --check --fresh 3", "--fresh", "cannot be combined with --check"),
+    ("reproduce --fill --quick", "--quick", "cannot be combined with --fill")])
+def test_an_option_that_would_have_no_effect_is_refused(words, options, why, command):
+    assert command(words, code=2).err.endswith(f"Invalid value for {options}: {why}\n")
+
+
 def test_names_of_settings_that_differ_late_give_different_folders():
     one, other = (slug(f"tpm:damping=0.{'0' * 300}{digit}") for digit in "12")
     assert one != other

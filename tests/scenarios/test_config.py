@@ -154,6 +154,16 @@ def test_every_key_has_a_meaning_and_the_page_of_keys_is_as_the_program_has_them
         "run `python docs/_ext/scenario_keys.py`")
 
 
+@pytest.mark.parametrize(("key", "said"), [
+    ("plant.kind", '[plant]\n  kind: default "kinematic"\n      "kinematic": Follows its '),
+    ("tasks.0.path.kind", '[tasks.path]\n  kind: required\n      "still": A point that'),
+    ("kind", "kind is a key of several sections:\n  plant.kind\n  sensor.kind\n  pointing.kind\n"
+             "  avoidance.kind\n"),
+    ("pointing.kind", '[pointing]\n  kind: "equality", "inequality", default "inequality"\n')])
+def test_a_kind_is_explained_by_those_there_are(key, said, command):
+    assert command("help", key).out.startswith(said)
+
+
 def test_compare_runs_a_group_side_by_side_each_scenario_with_its_own_resolver(
         tmp_path, monkeypatch, command, undrawn):
     monkeypatch.chdir(tmp_path)

@@ -64,11 +64,16 @@ def test_a_data_frame_has_a_column_for_each_number(run, library, monkeypatch):
 
 
 @pytest.mark.parametrize("path", NOTEBOOKS, ids=lambda path: path.stem)
-def test_the_notebooks_of_the_documents_run_from_top_to_bottom(path, tmp_path, monkeypatch):
+def test_the_notebooks_of_the_documents_run_and_print_what_is_stored_up_to_numbers(
+        path, tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     names = {"__name__": "__main__"}
     for number, cell in enumerate(cells_of(path, "code")):
         exec(compile("".join(cell["source"]), f"{path.name}, code cell {number}", "exec"), names)
+        stored = "".join("".join(out.get("text", "")) for out in cell["outputs"])
+        said, stored = (re.sub(r"-?\d[\d.e+-]*", "#", text)
+                        for text in (capsys.readouterr().out, stored))
+        assert said == stored
 
 
 @pytest.mark.parametrize("path", NOTEBOOKS, ids=lambda path: path.stem)

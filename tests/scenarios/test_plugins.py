@@ -113,6 +113,7 @@ def test_the_kinds_of_a_plugin_are_explained_and_a_wrong_key_meets_only_its_own(
     assert said.startswith('[[tasks]] with kind = "elbow"')
     assert "  joint: string, required" in said
     assert "  gain: number, default 2.0" in said
+    assert '\n      "elbow": ' in command("help tasks.kind --plugin doors_of_mine").out
     said = command("check own.toml --plugin doors_of_mine --set tasks.0.joynt=1", code=2).err
     assert "unknown key 'tasks.0.joynt'; did you mean 'tasks.0.joint'? Known: angle," in said
 

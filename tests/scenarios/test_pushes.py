@@ -122,10 +122,11 @@ def test_no_peak_between_two_frames_is_lost(recording):
         assert ((curve.low <= curve.value) & (curve.value <= curve.high)).all()
 
 
-def test_frames_end_where_the_state_stops_being_finite():
+@pytest.mark.parametrize("rate", [1.0, 1e15])
+def test_frames_end_where_the_state_stops_being_finite_and_are_no_more_than_ticks(rate):
     q = np.zeros((5, 7))
     q[3:] = np.nan
-    assert scene(hand_made(q=q, order=np.zeros(5, int)), rate=1.0).ticks.tolist() == [0, 1, 2]
+    assert scene(hand_made(q=q, order=np.zeros(5, int)), rate).ticks.tolist() == [0, 1, 2]
 
 
 def test_levels_that_were_not_judged_are_unknown_where_they_are_in_the_stack():

@@ -24,6 +24,7 @@ WAYPOINTS = ["position.path.times=[0, 1]", "position.path.points=[[0, 0, 0], [0,
 @pytest.mark.parametrize(("name", "changes"), [
     ("ellipse", ["start.end_effector=[5, 5, 5]"]), ("ellipse", ["robot.model=ur5"]),
     ("stand-push", ["contacts.0.frame=left_fot"]),
+    ("ellipse-published", ["robot.control_points=[" + 8 * "{joint='joint_4'}," + "]"]),
     ("stand-push-smooth", ['control.options.merged.scales={"least forc"=9.0}']),
     ("human", ["plant.kind=kinematic", "control.metric=mass", "sensor.latency=0.01"])])
 def test_what_does_not_fit_the_robot_is_said_by_check_and_run(
@@ -80,6 +81,9 @@ def test_a_point_far_away_that_stands_for_a_direction_is_not_taken_for_millimetr
     turned = load("dual-arm", {"tasks": [{"kind": "posture", "joints": {"a": 90.0}}]})
     assert [*doubtful_units(turned)] == [
         "tasks.0.joints.a = 90 rad or m: joint angles are in radians"]
+    assert [*doubtful_units(load("stand-push", {"plant.pushes.0.direction": 0.5}))] == [
+        "plant.pushes.0.direction = 0.5 deg: cones and pushes are in degrees; all other angles are "
+        "in radians"]
 
 
 def test_obstacles_are_reached_by_number_or_all_at_once():
@@ -136,6 +140,8 @@ H = Hierarchy.from_levels([([[1.0, 0.0]], [-0.1], [0.1]), ([[1.0, 0.5]], [0.3])]
     (lambda: load("dual-arm", {"tasks": [{"kind": "pose", "rotation": [0.0, 0.0, 0.0, 1.0]}]}),
      "tasks.0.rotation: expected 3 entries, not 4, got [0.0,"),
     (lambda: load("ellipse", ["forces.least=1.0"]), '[forces] needs control.level = "torque"'),
+    (lambda: load("ellipse-velocity", ["limits={acceleration=9.0, torque=0.5}"]),
+     'limits.torque does not go with control.level = "velocity"'),
     (lambda: load("ellipse-set-based", ["tasks=[{kind='self-collision', rate=3.0}]"]),
      'tasks.0.rate = 3 does not go with control.stack = "set-based"'),
     (lambda: load("ellipse-set-based", ["tasks=[{kind='com', give=0.1}]"]),
@@ -143,6 +149,8 @@ H = Hierarchy.from_levels([([[1.0, 0.0]], [-0.1], [0.1]), ([[1.0, 0.5]], [0.3])]
     (lambda: load("ellipse-set-based", ["tasks=[{kind='self-collision', give=0.1}]"]),
      "tasks.0.give = 0.1 does not go with"),
     (lambda: load("ellipse-smooth", ["control.damping=2.0"]), "control.damping = 2 does not go"),
+    (lambda: load("ellipse", ["control.damping=0.05"]), 'damping = 0.05 goes with level = "veloc'),
+    (lambda: load("ellipse", ["control.transition_time=0.5"]), 's goes with transition = "blend"'),
     (lambda: load("ellipse-hqp", ["control.transition=blend"]),
      'control.transition = "blend" goes with control.stack = "switched", got "hierarchical"'),
     (lambda: load("ellipse", ["avoidance.place=null-space", "avoidance.dimension=3"]),

@@ -81,7 +81,7 @@ def test_a_backend_that_is_not_installed_names_what_brings_it(name, monkeypatch)
     backends.installed.cache_clear()
     monkeypatch.setitem(sys.modules, backends.BACKENDS[name].module, None)
     extra = "scenarios" if name in ("proxqp", "osqp") else "qp"
-    with pytest.raises(HierarchyError, match=rf"'{name}' is not .*hierarchy\[{extra}\]$"):
+    with pytest.raises(HierarchyError, match=rf"'{name}' is not .* 'task-hierarchy\[{extra}\]'$"):
         make("hqp", backend=name)
     backends.installed.cache_clear()
 

@@ -25,7 +25,7 @@ class Sensor(Protocol):
     outside: float  #: Time [s] of the last measurement that the control loop would not spend.
 
     def measure(self, state: State) -> Measurement:
-        """Measure at a state and hang the measurement on it; valid until the next call."""
+        """Measure at a state and attach the measurement to it; valid until the next call."""
 
 
 _TOUCHING = 1e-9  # [m] a control point this close to an obstacle has no direction away from it

@@ -87,6 +87,12 @@ class ControlSection(keys.Section):
             table = self.options[name]
             make(name, **(table if isinstance(table, dict) else {name: table}))
         make(self.resolver, **self.settings())
+        fields = type(self).model_fields
+        if self.level != "velocity" and self.damping not in (0.0, fields["damping"].default):
+            yield (f'damping = {self.damping:g} goes with level = "velocity", got "{self.level}"; '
+                   "that of a resolver is options.damping")
+        if self.transition == "none" and self.transition_time != fields["transition_time"].default:
+            yield f'transition_time = {self.transition_time:g} s goes with transition = "blend"'
         if self.ticks > MOST_TICKS:
             yield (f"duration = {self.duration:g} s at period = {self.period:g} s is "
                    f"{self.duration / self.period:.3g} ticks; a recording keeps at most "

@@ -109,7 +109,7 @@ def write_all(recordings: Sequence[Recording], folder: Path) -> None:
     with drawing.styled(drawing.present()):
         drawn = dict(figures(recordings))
         refuse(not drawn and len(recordings) > 1, "more than two runs make only the letter's "
-               "figures 4 to 7, 9 and 10, and its runs are not among these")
+               "figures 4 to 7, 9 and 10, and its runs, as shipped, are not among these")
         for name, fig in drawn.items():
             drawing.write(fig, str(folder / name))
 
