@@ -97,6 +97,9 @@ def build(scenario: Scenario, kept: Cell | None = None) -> Cell:
     differences = scenario.control.jacobian_derivative == "difference"
     state = kept.state if kept else State(at.robot,
                                           scenario.control.period if differences else None)
+    if kept is None:  # a first tick without a measurement continues from here
+        state.move(0.0, plant.q, plant.v)
+        state.commanded = plant.v.copy() if scenario.control.level == "velocity" else None
     rows, activation = _rows(scenario, tasks.all, state)
     stack = Stack(rows, scenario.control.level, tasks.reference, at.contacts,
                   "mass" if scenario.control.metric == "mass" else None, tasks.give)

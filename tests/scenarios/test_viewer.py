@@ -59,6 +59,28 @@ def test_a_live_run_that_nobody_touches_is_the_run_itself_and_starts_again_with_
     np.testing.assert_array_equal(live.recording()["q"][0], recording["q"][0])
 
 
+@pytest.mark.parametrize(("name", "changes", "count"), [
+    ("ellipse", {"control.jacobian_derivative": "difference"}, 120),
+    ("ellipse-limits", {"control.level": "velocity", "plant": {"kind": "mujoco"},
+                        "limits.acceleration": 3.0}, 60),
+    ("ellipse", {"control.transition": "blend", "control.transition_time": 0.1}, 380),
+    ("step", {"control.resolver": "merged"}, 60),
+    ("ellipse-limits", {"start.v": [0.2] * 7, "control.policy": {
+        "deadline": 1e-9, "overrun": "stop"}}, 30)],
+    ids=["differences", "lag", "transition", "torque step and memory", "stop"])
+def test_a_change_to_the_same_settings_changes_no_command(name, changes, count):
+    lives = [Live(load(name, changes)) for _ in range(2)]
+    for live, changed in zip(lives, (False, True), strict=True):
+        ticks(live, count - 20)
+        if changed:
+            live.switch("own")
+        ticks(live, 20)
+    alone, other = (live.recording() for live in lives)
+    assert alone.ticks == other.ticks
+    np.testing.assert_array_equal(alone["command"], other["command"])
+    assert lives[0].controller.policy.fault == lives[1].controller.policy.fault
+
+
 def test_a_jump_that_a_hand_has_made_is_not_explained_by_rows_without_it():
     live = Live(LIMITED)
     ticks(live, 10)

@@ -165,12 +165,13 @@ class Live:
     def _take_over(self, scenario: Scenario) -> None:
         """Continue with another scenario of the same robot and plant."""
         before = self.controller.cell
-        measurement, commanded = before.state.measurement, before.state.commanded
+        measurement = before.state.measurement
         try:
             controller = Controller(scenario, build(scenario, before))
         except HierarchyError:
-            before.state.measurement, before.state.commanded = measurement, commanded
+            before.state.measurement = measurement
             raise
+        controller.follow(self.controller)
         self.scenario = scenario
         if not self.over:  # what is seen after the end stays; a restart takes the new settings
             self.controller = controller
