@@ -60,9 +60,10 @@ def test_the_best_of_each_row_is_marked(runs, label, marked):
     assert best(next(row for row in table(runs) if row.label.startswith(label))) == marked
 
 
-def test_units_of_joints_that_turn_and_of_those_that_slide_are_not_mixed():
+@pytest.mark.parametrize("units", [("rad", "m"), ("rad or m", "rad or m"), ("rad", "rad or m")])
+def test_units_of_joints_that_turn_and_of_those_that_slide_are_not_mixed(units):
     runs = [made(LETTER), made(LETTER, scenario=asked(name="other"))]
-    for run, unit in zip(runs, ("rad", "m"), strict=True):
+    for run, unit in zip(runs, units, strict=True):
         vars(run)["metrics"] = {"excess": Metric("excess", "Beyond", 0.5, unit)}
     (row,) = table(runs)
     assert (row.unit, *(cell.text for cell in row.cells)) == ("rad or m", "0.500", "0.500")
