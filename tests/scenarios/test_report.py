@@ -203,12 +203,14 @@ def test_a_joint_has_one_colour_in_a_figure_of_two_runs():
     assert len(first) == 8
 
 
-def test_a_joint_whose_name_begins_with_an_underscore_is_in_the_legend():
-    """matplotlib leaves such labels out of its own."""
+@pytest.mark.parametrize("name", ["_{}", r"${}\q$"])
+def test_a_joint_is_in_the_legend_whatever_its_name(name):
+    """matplotlib leaves labels with an underscore out of its own, and reads others as formulas."""
     run = recording()
-    robot = dataclasses.replace(run.facts.robot, velocity_names=tuple(f"_{i}" for i in range(7)))
+    robot = dataclasses.replace(run.facts.robot, velocity_names=tuple(map(name.format, range(7))))
     run = dataclasses.replace(run, facts=dataclasses.replace(run.facts, robot=robot))
     fig = letter.stacked([(run, [letter.PANEL["joint-velocities"]])], "")
+    fig.draw_without_rendering()
     assert [text.get_text() for text in fig.legends[0].texts] == [*robot.velocity_names]
 
 
