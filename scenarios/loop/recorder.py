@@ -162,6 +162,12 @@ class Recorder:
             placed = self.facts.robot.placements(signals["true_q"])
             signals["true_ee_position"] = placed_points(
                 placed, [self._frame.joint], self._frame.offset)[:, 0]
+            at = signals["t"], signals["true_q"], signals["true_v"]
+            signals |= {f"true_{name}": values for name, values in listed.signals(
+                robot, cell.tasks.listed, *at).items()}
+            if (task := cell.tasks.pointing) is not None:
+                (error,) = listed.signals(robot, [task], *at).values()
+                signals["true_pointing_error"] = error[:, 0]
         signals |= {"joint_lower": robot.lower, "joint_upper": robot.upper,
                     "velocity_limit": cell.velocity_limit}
         if cell.contacts is not None:

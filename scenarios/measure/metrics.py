@@ -61,7 +61,7 @@ def _pointing(recording: Recording, by: Criteria) -> Iterator[Metric]:
     if "pointing_error" not in recording or pointing is None:
         return
     half_angle = pointing.alpha_d
-    beyond = pointing.angle(recording["pointing_error"]) - half_angle
+    beyond = pointing.angle(true(recording, "pointing_error")) - half_angle
     yield _tracks("cone_violation_max", "Beyond the cone, max",
                   finite(max(float(beyond.max()), 0.0)), "deg", note=f"a cone of {half_angle:g}°")
     yield _tracks("cone_violation_share", "Time outside the cone",
