@@ -193,9 +193,9 @@ class Recorder:
         if cell.tasks.listed:
             signals |= listed.signals(cell.robot, cell.tasks.listed, log.t, log.q, log.v)
         if cell.contacts is not None:
-            answers = self._answers[rows].copy()
+            answers, points = self._answers[rows].copy(), len(cell.contacts.points.joints)
             signals |= {"planned_acceleration": answers[:, :n],
-                        "planned_force": answers[:, n:].reshape(len(answers), -1, 3)}
+                        "planned_force": answers[:, n:].reshape(len(answers), points, 3)}
         if self._blend is not None:
             signals["transition"] = self._weights[rows].copy()
         if log.distance.shape[1]:

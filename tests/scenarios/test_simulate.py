@@ -9,7 +9,9 @@ import pytest
 
 import scenarios.loop.simulation
 from benchmark.studies.reference_runs import EVERY, RIGHT, RUNS, differences, reference
+from hierarchy.errors import HierarchyError
 from scenarios import load, load_run, save, simulate
+from scenarios.export import export
 from scenarios.loop.recorder import Recorder
 from scenarios.measure.judging import Rows
 from scenarios.recording.fate import Fate
@@ -43,6 +45,15 @@ def test_a_tick_in_which_a_run_is_interrupted_is_not_part_of_it(within, monkeypa
     assert whole.events
     assert run["time_tick"].max() < 10.0, "no reading of a clock"
     np.testing.assert_array_equal(run["desired_position"], whole["desired_position"][:7])
+
+
+def test_a_run_with_contacts_that_is_interrupted_in_its_first_tick_has_none(monkeypatch, tmp_path):
+    monkeypatch.setattr(Recorder, "look", lambda self: signal.raise_signal(signal.SIGINT))
+    run = simulate(load("wipe", ["control.duration=0.01"]))
+    assert (run.fault, run["planned_force"].shape) == ("interrupted at tick 0", (0, 1, 3))
+    assert load_run(save(run, tmp_path / "run")).ticks == 0
+    with pytest.raises(HierarchyError, match="no tick"):
+        export(run, tmp_path / "run.mcap")
 
 
 def test_answers_that_settle_are_certified_under_faults_too():
