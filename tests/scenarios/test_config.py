@@ -2,6 +2,7 @@
 
 import json
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -226,6 +227,18 @@ def test_runs_part_at_a_tick_for_a_reason_that_is_not_after_it(other, tick, why)
     assert (one.tick, one.largest) == (tick, np.inf if tick == 2 else 1e-3)
     assert f"at tick {tick} ({tick}.00 s), by " in str(one)
     assert why in one.why
+
+
+@pytest.mark.parametrize("units", [("m",) * 7, ("rad", *("m",) * 6)])
+def test_runs_of_joints_that_slide_part_by_metres(units):
+    runs = [run_of("recursive"), run_of("hqp", away_from(3))]
+    for run in runs:
+        facts = run.recording.facts
+        robot = replace(facts.robot, velocity_units=units)
+        vars(run.recording)["facts"] = replace(facts, robot=robot)
+    unit = " or ".join(dict.fromkeys(units))
+    (one,) = partings(runs)
+    assert f"by more than 1e-06 {unit} at tick 3 (3.00 s), by 0.001 {unit} at most" in str(one)
 
 
 def test_resolvers_that_are_not_strict_need_not_agree():
