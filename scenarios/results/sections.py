@@ -1,7 +1,6 @@
 """The sections of the page: numbers with the best marked, events, settings, figures."""
 
 from collections.abc import Iterable, Mapping, Sequence
-from typing import Any
 
 import numpy as np
 from markupsafe import Markup
@@ -127,8 +126,9 @@ def _key(figures: Iterable[Figure]) -> dict[str, str]:
     """Return the legend of a panel's joints or tasks, if colours mean the same in all runs."""
     keys = []
     for fig in figures:
-        drawn: Any = fig.axes[0].get_legend_handles_labels()
-        keys.append({label: line.get_color() for line, label in zip(*drawn, strict=True)})
+        drawn = {str(line.get_label()): str(line.get_color()) for line in fig.axes[0].lines}
+        keys.append({label: colour for label, colour in drawn.items()
+                     if not label.startswith("_child")})  # matplotlib's names of those without
     colours = list(keys[0].values())
     clear = set(colours) <= set(drawing.JOINTS) and len(set(colours)) == len(colours)
     return keys[0] if clear and all(one == keys[0] for one in keys) else {}

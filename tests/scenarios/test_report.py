@@ -17,12 +17,14 @@ from hierarchy.errors import HierarchyError
 from scenarios import load, save, simulate
 from scenarios.cell.sensors.sensor import packed_laws
 from scenarios.draw.figures import drawing, letter, picture, timeline
+from scenarios.draw.figures.palette import looks
 from scenarios.measure.metrics import Metric
 from scenarios.measure.motions import motions
 from scenarios.measure.runs import Run, table
 from scenarios.measure.verdict import Comparison
 from scenarios.recording.recording import Event
 from scenarios.results import page as results_page
+from scenarios.results import sections
 from scenarios.results.page import comparison_page as page
 from scenarios.results.page import run_command
 from scenarios.scene.drawn import scene
@@ -212,6 +214,8 @@ def test_a_joint_is_in_the_legend_whatever_its_name(name):
     fig = letter.stacked([(run, [letter.PANEL["joint-velocities"]])], "")
     fig.draw_without_rendering()
     assert [text.get_text() for text in fig.legends[0].texts] == [*robot.velocity_names]
+    cards = sections.multiples("", motions([Run(run.scenario, "own", "own", run)]), looks(["own"]))
+    assert all(name in cards for name in robot.velocity_names)
 
 
 def test_a_picture_links_the_body_with_the_surface_and_shows_where_listed_tasks_are_to_go(
