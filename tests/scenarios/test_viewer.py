@@ -42,6 +42,8 @@ def test_a_live_run_that_nobody_touches_is_the_run_itself_and_starts_again_with_
     assert "changed" not in found
     for name in ("t", "q", "v", "command", "order"):
         assert (found[name] == recording[name]).all(), name
+    live.change({"pointing.alpha_d": 15.0})
+    assert live.changes == [], "they are for the next run"
     live = Live(LIMITED)
     ticks(live, 10)
     live.drag(0, (3.0, 4.0, 0.0))  # as far as it may go

@@ -84,9 +84,7 @@ class Live:
 
     def change(self, changes: Mapping[str, Any]) -> None:
         """Change the values of dotted keys of the scenario."""
-        self._take_over(self.scenario.with_changes(changes))
-        self.changes += [{"t": self.t, "key": key, "value": value}
-                         for key, value in changes.items()]
+        self._take_over(self.scenario.with_changes(changes), changes)
 
     def switch(self, spec: str) -> None:
         """Continue with another resolver, "name" or "name:setting=value"."""
@@ -96,8 +94,7 @@ class Live:
         resolver = scenario.make_resolver()
         if not resolver.can_resolve(scenario.asks):
             raise ScenarioError(f"{spec} cannot resolve the {scenario.asks} of this stack")
-        self._take_over(scenario)
-        self.changes.append({"t": self.t, "key": "control.resolver", "value": spec})
+        self._take_over(scenario, {"control.resolver": spec})
 
     def drag(self, h: int, offset: ArrayLike) -> None:
         """Move obstacle h to `offset` (3,) [m] from its place or path, at limited speed."""
@@ -162,7 +159,7 @@ class Live:
                                                  encoding="utf-8")
         return recording
 
-    def _take_over(self, scenario: Scenario) -> None:
+    def _take_over(self, scenario: Scenario, changes: Mapping[str, Any]) -> None:
         """Continue with another scenario of the same robot and plant."""
         before = self.controller.cell
         measurement = before.state.measurement
@@ -176,6 +173,8 @@ class Live:
         if not self.over:  # what is seen after the end stays; a restart takes the new settings
             self.controller = controller
             self.recorder.follow(controller)
+            self.changes += [{"t": self.t, "key": key, "value": value}
+                             for key, value in changes.items()]
 
     def _drag_on(self) -> None:
         """Move dragged obstacles by one tick toward their targets."""
