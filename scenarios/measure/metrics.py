@@ -190,9 +190,9 @@ def measure(recording: Recording, settle: float = 2.0,
     settle : [s] after which the start, which may lie off the path, no longer counts.
     cone_tolerance_deg : [deg] beyond the cone that still counts as being on it.
 
-    Distances, joint speeds and joint limits are judged by the true state where it is known apart
-    from the measured one. A plugin adds metrics with `register("metrics", NAME)` on a function of
-    a recording and Criteria that yields them; if it fails, a warning says so.
+    Distances, joint speeds, limits, cone and listed tasks are judged by the true state where it is
+    known apart from the measured one. A plugin adds metrics with `register("metrics", NAME)` on a
+    function of a recording and Criteria that yields them; if it fails, a warning says so.
     """
     if recording.ticks == 0:
         return {}
