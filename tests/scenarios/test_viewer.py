@@ -83,6 +83,17 @@ def test_a_change_to_the_same_settings_changes_no_command(name, changes, count):
     assert lives[0].controller.policy.fault == lives[1].controller.policy.fault
 
 
+def test_a_camera_goes_on_seeing_when_what_is_avoided_changes():
+    camera = {"kind": "camera", "width": 64, "height": 48, "fx": 52.0, "fy": 52.0,
+              "rate": 100.0, "latency": 0.01}
+    live = Live(load("ellipse", {"sensor": camera}))
+    ticks(live, 15)
+    live.change({"avoidance.far": 0.22})
+    ticks(live, 15)
+    blind = [event.tick for event in live.recording().events if event.kind == "stale"]
+    assert blind == list(range(10)), "before the first image"
+
+
 def test_a_jump_that_a_hand_has_made_is_not_explained_by_rows_without_it():
     live = Live(LIMITED)
     ticks(live, 10)
