@@ -162,7 +162,7 @@ class Recorder:
             placed = self.facts.robot.placements(signals["true_q"])
             signals["true_ee_position"] = placed_points(
                 placed, [self._frame.joint], self._frame.offset)[:, 0]
-            at = signals["t"], signals["true_q"], signals["true_v"]
+            at = signals["t"], signals["true_q"], signals.get("true_v", signals["v"])
             signals |= {f"true_{name}": values for name, values in listed.signals(
                 robot, cell.tasks.listed, *at).items()}
             if (task := cell.tasks.pointing) is not None:
