@@ -18,6 +18,7 @@ from scenarios.config import Scenario, ScenarioError, load, members, shipped
 from scenarios.config.distributions import flat
 from scenarios.config.reference import keys_of, sections
 from scenarios.config.resolvers import default_resolvers
+from scenarios.config.sampling import drawn
 from scenarios.config.validation import _table, tag_at
 from scenarios.measure.motions import motions, partings
 from scenarios.measure.runs import Run
@@ -83,9 +84,9 @@ def test_a_file_is_beside_the_one_that_names_it_or_in_the_working_directory_of_a
     (tmp_path / "varied.toml").write_text(f'extends = "ellipse"\nvariation = {varied}\n')
     (tmp_path / "sweep.toml").write_text(
         f'name = "sweep"\nscenarios = ["ellipse"]\nsamples = 1\nparameters = {varied}\n')
-    for drawn in (load("../varied.toml").variation, load_sweep("../sweep.toml").parameters):
-        assert drawn["robot.model"].choice == (f"{tmp_path}/a.urdf", "kuka_lwr")
-        assert drawn["a.path.file"].choice == (f"{tmp_path}/b",)
+    for keys in (load("../varied.toml").variation, load_sweep("../sweep.toml").parameters):
+        assert keys["robot.model"].choice == (f"{tmp_path}/a.urdf", "kuka_lwr")
+        assert keys["a.path.file"].choice == (f"{tmp_path}/b",)
     assert found.with_changes({"robot.model": "c.urdf"}).robot.model == f"{tmp_path}/base/c.urdf"
 
 
@@ -193,6 +194,14 @@ def test_a_resolver_that_cannot_resolve_a_scenario_is_not_run_and_is_named(tmp_p
     assert done.refused[0] in (tmp_path / "a" / "index.html").read_text()
     refused("recursive is not run on limited", compare, [limited], ["recursive"])
     assert limited.with_changes({"limits.place": "guard"}).asks == "equalities"
+
+
+def test_a_joint_whose_name_has_a_dot_is_changed_and_varied_by_its_name():
+    own = load("ellipse", {"start.joints": {"hinge.001": 0.1, "hinge": 0.2},
+                           "variation": {"start.joints.hinge.001": {"around": 0.05}}})
+    changed = own.with_changes({"start.joints.hinge.001": 0.3})
+    assert changed.start.joints == {"hinge.001": 0.3, "hinge": 0.2}
+    assert abs(drawn(own, own.variation, 0, 0)["start.joints.hinge.001"] - 0.1) <= 0.05
 
 
 # Where strict resolvers part: the tick, and what was different before it.
