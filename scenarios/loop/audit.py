@@ -113,9 +113,12 @@ class Strictness:
 
     def __init__(self) -> None:
         self._memory: Any = None
+        self._of: Controller | None = None  # whose resolver has made the memory
 
     def __call__(self, tick: int, controller: Controller) -> Signals:
         """Solve a tick without the levels below the position; return `moved_by_lower` [m]."""
+        if controller is not self._of:
+            self._of, self._memory = controller, None
         h, control = controller.hierarchy, controller.cell.scenario.control
         level = h.names.index("position")
         rows = slice(h.offsets[level], h.offsets[level + 1])

@@ -70,15 +70,18 @@ class Fates:
                 "saturated": self._saturated[rows]}
 
 
-def completed(recording: Recording, cell: Cell) -> Recording:
+def completed(recording: Recording, cell: Cell, fates: Fates | None = None) -> Recording:
     """Return a run with the states of its levels and, if it has a camera, a depth image.
 
     `cell` is built from the run's scenario; its state is moved, its plant is not used. Ctrl-C or an
-    error ends it: the levels of the ticks that are left stay UNKNOWN.
+    error ends it: the levels of the ticks that are left stay UNKNOWN. `fates` are those of a run
+    whose levels were judged in their ticks.
     """
     try:
-        if recording.scenario.sensor.kind == "exact":
+        if fates is None:
             judge(recording, cell)
+        else:
+            recording.signals.update(fates.signals(recording))
         return replace(recording, depth=depth_view(recording))
     except (KeyboardInterrupt, Exception) as error:
         why = "interrupted" if isinstance(error, KeyboardInterrupt) else blamed(error)

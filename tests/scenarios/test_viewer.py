@@ -83,10 +83,24 @@ def test_a_change_to_the_same_settings_changes_no_command(name, changes, count):
     assert lives[0].controller.policy.fault == lives[1].controller.policy.fault
 
 
+CAMERA = {"kind": "camera", "width": 64, "height": 48, "fx": 52.0, "fy": 52.0, "rate": 100.0,
+          "latency": 0.01}
+
+
+@pytest.mark.parametrize(("name", "changes"), [("strictness", {}), ("ellipse", {"sensor": CAMERA})])
+def test_a_live_run_has_what_is_looked_at_in_each_tick(name, changes):
+    scenario = load(name, {"control.duration": 0.02, **changes})
+    live, recording = Live(scenario), simulate(scenario)
+    ticks(live, 1000)
+    found = live.recording()
+    assert found.signals.keys() == recording.signals.keys()
+    for signal, values in recording.signals.items():
+        if not signal.startswith("time_"):
+            np.testing.assert_array_equal(found[signal], values, signal)
+
+
 def test_a_camera_goes_on_seeing_when_what_is_avoided_changes():
-    camera = {"kind": "camera", "width": 64, "height": 48, "fx": 52.0, "fy": 52.0,
-              "rate": 100.0, "latency": 0.01}
-    live = Live(load("ellipse", {"sensor": camera}))
+    live = Live(load("ellipse", {"sensor": CAMERA}))
     ticks(live, 15)
     live.change({"avoidance.far": 0.22})
     ticks(live, 15)

@@ -16,8 +16,7 @@ from scenarios.cell.build import build
 from scenarios.config import Scenario, ScenarioError
 from scenarios.config.sections.plant import KinematicSection
 from scenarios.loop.controller import Controller
-from scenarios.loop.recorder import Recorder
-from scenarios.loop.simulation import rehearsed, tick
+from scenarios.loop.simulation import rehearsed, tick, watching
 from scenarios.measure.judging import Fates, completed
 from scenarios.measure.run_folder import save
 from scenarios.measure.verdict import verdict
@@ -52,7 +51,7 @@ class Live:
         self.fault: str | None = None
         self.controller = Controller(self.scenario)
         self.ticks = control.ticks
-        self.recorder = Recorder(self.controller, self.ticks)
+        self.recorder, self._fates = watching(self.controller, self.ticks)
         self.changes: list[dict[str, Any]] = []
         sensor = self.controller.cell.sensor
         self.obstacles = sensor.obstacles if sensor else None
@@ -119,7 +118,7 @@ class Live:
             recording.signals["changed"] = self._changed[:ticks]
             recording.signals["obstacle_offset"] = self._offsets[:ticks]
         exact = self.begun.model_copy(update={"plant": KinematicSection()})
-        return completed(recording, build(exact))
+        return completed(recording, build(exact), self._fates)
 
     def frame(self) -> Scene:
         """Return what is drawn after the last tick, one frame: the state at its start."""
