@@ -106,7 +106,7 @@ class Controller:
 
     def follow(self, before: "Controller") -> None:
         """Continue after another controller of the same robot and plant with other settings."""
-        self.policy.fault = before.policy.fault
+        self.policy.follow(before.policy)
         if self.cell.scenario.make_resolver() == before.cell.scenario.make_resolver():
             self._memory = before._memory
         if self.blend and before.blend:

@@ -83,6 +83,16 @@ def test_a_change_to_the_same_settings_changes_no_command(name, changes, count):
     assert lives[0].controller.policy.fault == lives[1].controller.policy.fault
 
 
+def test_the_last_good_command_is_held_across_a_change():
+    live = Live(LIMITED)
+    ticks(live, 5)
+    live.change({"control.policy": {"deadline": 1e-9, "overrun": "hold"}})
+    ticks(live, 1)
+    found = live.recording()
+    assert found.events == ((5, "overrun", "hold"),)
+    np.testing.assert_array_equal(found["command"][5], found["command"][4])
+
+
 CAMERA = {"kind": "camera", "width": 64, "height": 48, "fx": 52.0, "fy": 52.0, "rate": 100.0,
           "latency": 0.01}
 
