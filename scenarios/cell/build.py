@@ -91,12 +91,19 @@ def build(scenario: Scenario, kept: Cell | None = None) -> Cell:
     sensor = sensor_of(scenario, at.start, (kept.scenario, kept.sensor) if kept else None)
     plant = kept.plant if kept else plant_of(
         scenario, at.start, sensor.obstacles if sensor else Obstacles(), at.contacts)
-    if isinstance(sensor, DepthSensor) and isinstance(sensor.source, DepthCamera):
-        sensor.source.joints = (lambda: plant.true.q) if isinstance(plant, Apart) else None
+    if isinstance(sensor, DepthSensor):
+        if isinstance(sensor.source, DepthCamera):
+            sensor.source.joints = (lambda: plant.true.q) if isinstance(plant, Apart) else None
+        if kept and kept.scenario.sensor == scenario.sensor and isinstance(
+                kept.sensor, DepthSensor):
+            sensor.follow(kept.sensor)
     tasks = tasks_of(scenario, at)
     differences = scenario.control.jacobian_derivative == "difference"
     state = kept.state if kept else State(at.robot,
                                           scenario.control.period if differences else None)
+    if kept is None:  # a first tick without a measurement continues from here
+        state.move(0.0, plant.q, plant.v)
+        state.commanded = plant.v.copy() if scenario.control.level == "velocity" else None
     rows, activation = _rows(scenario, tasks.all, state)
     stack = Stack(rows, scenario.control.level, tasks.reference, at.contacts,
                   "mass" if scenario.control.metric == "mass" else None, tasks.give)

@@ -91,13 +91,24 @@ def place(data: Any, dotted: str, add: bool = False) -> tuple[Any, Any]:
     With `add` keys that a table does not have are allowed, and absent tables are made. Raises
     ValueError if there is no such key.
     """
-    *path, last = dotted.split(".")
-    for i, key in enumerate(path):
-        found = _within(data, key, ".".join(path[:i]), add)
+    above, (key, rest) = "", _first(data, dotted)
+    while rest:
+        found = _within(data, key, above, add)
         if add and isinstance(data, dict) and data.get(key) is None:
             data[key] = {}
         data = data[found] if isinstance(data, list) else data.get(found)
-    return data, _within(data, last, ".".join(path), add)
+        above = f"{above}.{key}" if above else key
+        # [variation] has dotted keys for nested ones
+        key, rest = _first({} if above == "variation" else data, rest)
+    return data, _within(data, key, above, add)
+
+
+def _first(data: Any, dotted: str) -> tuple[str, str]:
+    """Return the first part of a dotted key, and the rest; a name in a table may have dots."""
+    names = [key for key in data if f"{dotted}.".startswith(f"{key}.")] if isinstance(
+        data, dict) else []
+    first = max(names, key=len, default=dotted.partition(".")[0])
+    return first, dotted[len(first) + 1:]
 
 
 def _within(data: Any, key: str, above: str, add: bool) -> Any:

@@ -81,10 +81,10 @@ class ActiveSets:
             return -1
         key = h.names, bounds, states.tobytes()
         if key not in self._seen:
-            first = int(np.argmax(h.sizes > 0))  # unknowns are as rows of the first level with any
             acting = set[Row]()
             for i in np.flatnonzero((states != FREE) & (states != EQUAL)).tolist():
-                level = first if bounds else int((h.offsets[1:] <= i).sum())
+                # unknowns are as rows of the first level with any
+                level = int(np.argmax(h.sizes > 0)) if bounds else int((h.offsets[1:] <= i).sum())
                 acting.add((h.names[level], i if bounds else i - int(h.offsets[level]),
                             int(states[i])))
             self._seen[key] = self._numbers.setdefault(frozenset(acting), len(self._numbers))
@@ -98,6 +98,8 @@ def certify_tick(tick: int, controller: Controller) -> Signals:
         resolver = resolver.inner  # that which faults are around
     if isinstance(resolver, Settled) and h.plain:
         h = resolver.asked(h)
+    if h.giving and found.witnesses is None:  # the solve has failed before
+        return {"certified": False}
     return {"certified": certify(h, found.x, witnesses=found.witnesses).certified}
 
 
@@ -111,9 +113,12 @@ class Strictness:
 
     def __init__(self) -> None:
         self._memory: Any = None
+        self._of: Controller | None = None  # whose resolver has made the memory
 
     def __call__(self, tick: int, controller: Controller) -> Signals:
         """Solve a tick without the levels below the position; return `moved_by_lower` [m]."""
+        if controller is not self._of:
+            self._of, self._memory = controller, None
         h, control = controller.hierarchy, controller.cell.scenario.control
         level = h.names.index("position")
         rows = slice(h.offsets[level], h.offsets[level + 1])

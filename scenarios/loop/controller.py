@@ -56,11 +56,8 @@ class Controller:
         self._outside = 0.0
         self._deadline = control.policy.deadline or inf
         self._stale_after, self._measured_at = control.policy.stale_after, -inf
-        # A first tick without a measurement continues from this state.
-        cell.state.move(0.0, cell.plant.q, cell.plant.v)
         self.sent = cell.plant.v.copy() if self.level == "velocity" else np.zeros(
             cell.robot.n - (0 if cell.contacts is None else cell.robot.actuated))
-        cell.state.commanded = self.sent if self.level == "velocity" else None
         if cell.sensor is not None:
             cell.state.measurement = cell.sensor.measurement
         for order in cell.orders:
@@ -106,6 +103,14 @@ class Controller:
         if cell_contacts is not None and self.answered:
             state.carried = cell_contacts.carried(t, self.resolution.x, state.carried)
         return sent
+
+    def follow(self, before: "Controller") -> None:
+        """Continue after another controller of the same robot and plant with other settings."""
+        self.policy.follow(before.policy)
+        if self.cell.scenario.make_resolver() == before.cell.scenario.make_resolver():
+            self._memory = before._memory
+        if self.blend and before.blend:
+            self.blend.visits = before.blend.visits
 
     def rehearse(self) -> None:
         """Call every kernel of the loop once, so that none is loaded during timed ticks.

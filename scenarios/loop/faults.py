@@ -139,7 +139,9 @@ class _FaultyResolver(Around):
             return resolution
         status = Status[str(fault.status).upper()]
         x = np.zeros(h.n) if status is Status.NUMERICAL_FAILURE else resolution.x
-        return Resolution(x, status, resolution.iterations, resolution.memory)
+        found = Resolution(x, status, resolution.iterations, resolution.memory)
+        found.witnesses = resolution.witnesses
+        return found
 
 
 def with_room(scenario: Scenario) -> Scenario:

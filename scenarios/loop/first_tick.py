@@ -4,6 +4,8 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from math import isfinite
 
+import numpy as np
+
 from hierarchy.tasks.pairs import inseparable_pairs
 from hierarchy.tasks.separation import SelfSeparation
 from hierarchy.words import listed
@@ -19,7 +21,7 @@ from solvers import Status, explain, make
 from solvers.explain import is_missed
 
 _NAMED = 3        # pairs of capsules named at most
-_ROUNDING = 1e-6  # [m] below a distance that is not said
+_ROUNDING = 1e-6  # [m] below a distance that is not said, and of a period
 _NOTHING = 1e-12  # violation that rounding leaves of a robot at rest at its targets
 _MET = 1e-6       # violation of a level relative to its terms, below which it is met
 
@@ -128,7 +130,20 @@ def _warnings(scenario: Scenario, distances: dict[str, float]) -> Iterator[str]:
                 yield (f"{name}: {1e3 * distances[name]:.0f} mm from the nearest obstacle at the "
                        f"start, less than the {1e3 * kept[key]:.0f} mm to be kept")
     yield from doubtful_units(scenario)
-    end, pushes = scenario.control.duration, getattr(scenario.plant, "pushes", ())
-    for key, events in (("faults", scenario.faults), ("plant.pushes", pushes)):
-        yield from (f"{key}.{i}.at = {one.at:g} s is after the run, which ends at {end:g} s"
-                    for i, one in enumerate(events) if one.at >= end)
+    yield from _idle(scenario)
+
+
+def _idle(scenario: Scenario) -> Iterator[str]:
+    """Yield the faults and pushes that no tick of the run has."""
+    end, period = scenario.control.duration, scenario.control.period
+    begins, pushes = period * np.arange(scenario.control.ticks), getattr(
+        scenario.plant, "pushes", ())
+    for key, events, rounded in (("faults", scenario.faults, period / 2),
+                                 ("plant.pushes", pushes, _ROUNDING * period)):
+        for i, one in enumerate(events):
+            passed = begins + rounded - one.at
+            if one.at >= end:
+                yield f"{key}.{i}.at = {one.at:g} s is after the run, which ends at {end:g} s"
+            elif not ((passed >= 0.0) & (passed < one.duration)).any():
+                yield (f"{key}.{i} does nothing: from {one.at:g} s, for {one.duration:g} s, it "
+                       f"falls between two ticks of {period:g} s")

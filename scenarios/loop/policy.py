@@ -44,6 +44,11 @@ class Policy:
         self._good: Array | None = None
         self._forces: Array | None = None
 
+    def follow(self, before: "Policy") -> None:
+        """Continue after another policy of the same robot: its stop, and its last good command."""
+        self.fault, self._good = before.fault, before._good
+        self._held, self._forces = before._held, before._forces
+
     def choose(self, t: float, troubles: Sequence[str], x: Array, v: Array,
                forces: Array | None = None) -> Array:
         """Return the command (n,) to send at time t [s].

@@ -162,6 +162,12 @@ class Recorder:
             placed = self.facts.robot.placements(signals["true_q"])
             signals["true_ee_position"] = placed_points(
                 placed, [self._frame.joint], self._frame.offset)[:, 0]
+            at = signals["t"], signals["true_q"], signals.get("true_v", signals["v"])
+            signals |= {f"true_{name}": values for name, values in listed.signals(
+                robot, cell.tasks.listed, *at).items()}
+            if (task := cell.tasks.pointing) is not None:
+                (error,) = listed.signals(robot, [task], *at).values()
+                signals["true_pointing_error"] = error[:, 0]
         signals |= {"joint_lower": robot.lower, "joint_upper": robot.upper,
                     "velocity_limit": cell.velocity_limit}
         if cell.contacts is not None:
@@ -187,9 +193,9 @@ class Recorder:
         if cell.tasks.listed:
             signals |= listed.signals(cell.robot, cell.tasks.listed, log.t, log.q, log.v)
         if cell.contacts is not None:
-            answers = self._answers[rows].copy()
+            answers, points = self._answers[rows].copy(), len(cell.contacts.points.joints)
             signals |= {"planned_acceleration": answers[:, :n],
-                        "planned_force": answers[:, n:].reshape(len(answers), -1, 3)}
+                        "planned_force": answers[:, n:].reshape(len(answers), points, 3)}
         if self._blend is not None:
             signals["transition"] = self._weights[rows].copy()
         if log.distance.shape[1]:

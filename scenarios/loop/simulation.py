@@ -43,21 +43,28 @@ def simulate(scenario: Scenario | str | Path, progress: Callable[[int, int], Non
     faults = Faults(scenario) if scenario.faults else None
     controller = Controller(with_room(scenario) if faults else scenario, faults=faults)
     ticks = scenario.control.ticks
-    fates = Fates(controller.cell.stack.names, ticks, controller.cell.robot.n) \
-        if scenario.sensor.kind != "exact" else None  # rows cannot be written again without images
-    recorder = Recorder(controller, ticks, (
-        *([certify_tick] if certified else []),
-        *([Strictness()] if scenario.control.strictness else []),
-        *([fates.look] if fates else []), *audits))
+    recorder, fates = watching(controller, ticks, certified, audits)
     try:
         fault = _run(controller, recorder, scenario.control.period, ticks,
                      progress or (lambda done, total: None), faults)
     except KeyboardInterrupt:
         fault = f"interrupted at tick {recorder.ticks}"
-    recording = recorder.finish(scenario, fault)
-    if fates:
-        recording.signals.update(fates.signals(recording))
-    return completed(recording, rehearsal)
+    return completed(recorder.finish(scenario, fault), rehearsal, fates)
+
+
+def watching(controller: Controller, ticks: int, certified: bool = False,
+             audits: Sequence[Audit] = ()) -> tuple[Recorder, Fates | None]:
+    """Return a recorder with these audits and those of the scenario, and what judges its levels.
+
+    That is None where they can be judged after the run, whose rows are written again.
+    """
+    cell = controller.cell
+    fates = Fates(cell.stack.names, ticks, cell.robot.n) \
+        if cell.scenario.sensor.kind != "exact" else None  # no rows again without images
+    return Recorder(controller, ticks, (
+        *([certify_tick] if certified else []),
+        *([Strictness()] if cell.scenario.control.strictness else []),
+        *([fates.look] if fates else []), *audits)), fates
 
 
 def uninterrupted(scenario: Scenario, audits: Sequence[Audit] = ()) -> Recording:

@@ -40,7 +40,7 @@ class Blend:
 
     def __init__(self, time: float) -> None:
         self.weight, self._time = 1.0, time
-        self._visits: list[tuple[Key, float]] = []  # stacks and since when, the oldest first
+        self.visits: list[tuple[Key, float]] = []
         self._memories: dict[Key, Any] = {}
 
     def resolve(self, resolver: Resolver, stack: Stack, state: State,
@@ -72,7 +72,7 @@ class Blend:
 
     def weights(self, t: float, present: Key) -> dict[Key, float]:
         """Return the weight of each stack at time t [s], with `present` active from now on."""
-        visits = self._visits
+        visits = self.visits
         if not visits or visits[-1][0] != present:
             visits.append((present, t))
         while len(visits) > 1 and t - visits[1][1] >= self._time:
@@ -86,7 +86,7 @@ class Blend:
 
     def _shares(self, present: Key, t: float) -> dict[Key, float]:
         """Return the heaviest stacks and their weights, which need not sum to one."""
-        if len(self._visits) == 1 and self._visits[0][0] == present:
+        if len(self.visits) == 1 and self.visits[0][0] == present:
             return {present: 1.0}
         ranked = sorted(self.weights(t, present).items(), key=lambda item: -item[1])
         # Minus the first weight left out, so that nothing jumps when two stacks change places.

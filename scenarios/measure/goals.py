@@ -92,7 +92,7 @@ def _tasks(recording: Recording) -> Iterator[_Asked]:
         off = np.linalg.norm(apart, axis=1)
         yield "position", _in_words(scenario.position), "m", off, False
     if scenario.pointing is not None and "pointing_error" in recording:
-        for unit, off in scenario.pointing.sizes(recording["pointing_error"][:, None]):
+        for unit, off in scenario.pointing.sizes(true(recording, "pointing_error")[:, None]):
             yield ("pointing", _in_words(scenario.pointing), unit, off,
                    scenario.pointing.one_sided)
     for section, unit, off in errors(recording):

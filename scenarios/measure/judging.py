@@ -70,15 +70,18 @@ class Fates:
                 "saturated": self._saturated[rows]}
 
 
-def completed(recording: Recording, cell: Cell) -> Recording:
+def completed(recording: Recording, cell: Cell, fates: Fates | None = None) -> Recording:
     """Return a run with the states of its levels and, if it has a camera, a depth image.
 
     `cell` is built from the run's scenario; its state is moved, its plant is not used. Ctrl-C or an
-    error ends it: the levels of the ticks that are left stay UNKNOWN.
+    error ends it: the levels of the ticks that are left stay UNKNOWN. `fates` are those of a run
+    whose levels were judged in their ticks.
     """
     try:
-        if recording.scenario.sensor.kind == "exact":
+        if fates is None:
             judge(recording, cell)
+        else:
+            recording.signals.update(fates.signals(recording))
         return replace(recording, depth=depth_view(recording))
     except (KeyboardInterrupt, Exception) as error:
         why = "interrupted" if isinstance(error, KeyboardInterrupt) else blamed(error)
@@ -119,8 +122,7 @@ class Rows:
         self._carried: list[Array | None] = [None]  # by the contacts before each tick
         self._changed = recording.get("changed", np.zeros(recording.ticks, bool))
         self.meant = recording["command"] if level != "torque" else np.hstack([
-            recording["planned_acceleration"],
-            recording["planned_force"].reshape(recording.ticks, -1)])
+            recording["planned_acceleration"], *recording["planned_force"].swapaxes(0, 1)])
         if cell.contacts:
             for t, x in zip(self._t, self.meant, strict=True):
                 last = self._carried[-1]

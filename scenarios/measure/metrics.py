@@ -61,7 +61,7 @@ def _pointing(recording: Recording, by: Criteria) -> Iterator[Metric]:
     if "pointing_error" not in recording or pointing is None:
         return
     half_angle = pointing.alpha_d
-    beyond = pointing.angle(recording["pointing_error"]) - half_angle
+    beyond = pointing.angle(true(recording, "pointing_error")) - half_angle
     yield _tracks("cone_violation_max", "Beyond the cone, max",
                   finite(max(float(beyond.max()), 0.0)), "deg", note=f"a cone of {half_angle:g}°")
     yield _tracks("cone_violation_share", "Time outside the cone",
@@ -190,9 +190,9 @@ def measure(recording: Recording, settle: float = 2.0,
     settle : [s] after which the start, which may lie off the path, no longer counts.
     cone_tolerance_deg : [deg] beyond the cone that still counts as being on it.
 
-    Distances, joint speeds and joint limits are judged by the true state where it is known apart
-    from the measured one. A plugin adds metrics with `register("metrics", NAME)` on a function of
-    a recording and Criteria that yields them; if it fails, a warning says so.
+    Distances, joint speeds, limits, cone and listed tasks are judged by the true state where it is
+    known apart from the measured one. A plugin adds metrics with `register("metrics", NAME)` on a
+    function of a recording and Criteria that yields them; if it fails, a warning says so.
     """
     if recording.ticks == 0:
         return {}

@@ -8,18 +8,20 @@ from typing import Any
 import numpy as np
 
 from scenarios.measure.runs import Run
+from scenarios.measure.safety import units_of
 from scenarios.recording.recording import Recording
 
-BOUND = 1e-6  # [rad] of any joint, or what the resolver declares as its accuracy where that is more
+# [rad or m] of any joint, or what the resolver declares as its accuracy where that is more
+BOUND = 1e-6
 Labelled = tuple[str, Recording]
-# [rad] of any joint at any time, within which two runs are the same motion: 0.01 mm at the end of
-# an arm of 1 m, which no figure shows.
+# [rad or m] of any joint at any time, within which two runs are the same motion: 0.01 mm at the end
+# of an arm of 1 m, which no figure shows.
 ALIKE = 1e-5
 
 
 @dataclass(frozen=True)
 class Motion:
-    """Runs with the same motion, and the largest difference between their joints [rad]."""
+    """Runs with the same motion, and the largest difference between their joints."""
 
     runs: tuple[Run, ...]
     apart: float = 0.0
@@ -62,7 +64,7 @@ def motions(runs: Sequence[Run], also: Callable[[Recording], Any] = lambda one: 
 
 
 def departure(run: Run, other: Run) -> float:
-    """Return the largest difference of any joint [rad]; infinite for runs of two scenarios."""
+    """Return the largest difference of any joint; infinite for runs of two scenarios."""
     q, reference = (one.recording["q"] if one.recording else np.empty(0) for one in (run, other))
     if run.scenario.name != other.scenario.name or q.shape != reference.shape:
         return math.inf
@@ -73,8 +75,8 @@ def departure(run: Run, other: Run) -> float:
 class Parting:
     """How one strict resolver's run stands to that of the first strict one.
 
-    tick : the first at which a joint is more than `bound` [rad] away, or None where none is.
-    largest : [rad] over all ticks that both runs have.
+    tick : the first at which a joint is more than `bound` away, or None where none is.
+    largest : over all ticks that both runs have, in the `unit` of the joints.
     why : what was different up to that tick, as half a sentence; "" where tick is None.
     """
 
@@ -82,6 +84,7 @@ class Parting:
     other: str
     bound: float
     largest: float
+    unit: str
     tick: int | None = None
     time: float = 0.0
     why: str = ""
@@ -90,10 +93,11 @@ class Parting:
         if self.largest == 0.0:
             return f"{self.label} moves as {self.other} to the last bit"
         if self.tick is None:
-            return f"{self.label} stays within {self.largest:.1e} rad of {self.other} to the end"
-        return (f"{self.label} diverges from {self.other} by more than {self.bound:.0e} rad at "
-                f"tick {self.tick} ({self.time:.2f} s), by {self.largest:.2g} rad at most: "
-                f"{self.why}")
+            return (f"{self.label} stays within {self.largest:.1e} {self.unit} of {self.other} "
+                    "to the end")
+        return (f"{self.label} diverges from {self.other} by more than {self.bound:.0e} "
+                f"{self.unit} at tick {self.tick} ({self.time:.2f} s), by {self.largest:.2g} "
+                f"{self.unit} at most: {self.why}")
 
 
 def partings(runs: Sequence[Run]) -> list[Parting]:
@@ -116,9 +120,9 @@ def _parting(one: Labelled, other: Labelled) -> Parting:
     beyond = np.flatnonzero(~(apart <= bound))
     largest = float(np.nan_to_num(apart, nan=np.inf).max())
     if not beyond.size:
-        return Parting(label, first, bound, largest)
+        return Parting(label, first, bound, largest, units_of(mine))
     tick = int(beyond[0])
-    return Parting(label, first, bound, largest, tick, float(mine["t"][tick]),
+    return Parting(label, first, bound, largest, units_of(mine), tick, float(mine["t"][tick]),
                    _why(one, other, tick, accuracy))
 
 

@@ -142,7 +142,7 @@ def by_name(each: Iterable[Mapping[str, Metric]]) -> dict[str, Metric]:
     """Return the metrics of runs by name, in "rad or m" where joints turn in some and slide."""
     found: dict[str, Metric] = {}
     for name, one in (item for of in each for item in of.items()):
-        units = [*found[name].unit.split(" or "), one.unit] if name in found else [one.unit]
+        units = [unit for of in (found.get(name, one), one) for unit in of.unit.split(" or ")]
         found[name] = replace(one, unit=" or ".join(dict.fromkeys(units)))
     return found
 

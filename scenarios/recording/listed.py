@@ -64,13 +64,14 @@ def _position(task: Task, state: State) -> Array | None:
 
 
 def errors(recording: Recording) -> Iterator[tuple[ListedTask, str, Array]]:
-    """Yield section, unit and size of the error (T,) of each listed task.
+    """Yield section, unit and size of the error (T,) of each listed task, the true one if known.
 
     A pose or frame comes twice, in [m] and [deg]; a pointing task in [deg], off its cone or outside
     it; a task that looks at a point in [deg].
     """
     units = recording.facts.robot.joint_units
     for section in recording.scenario.tasks:
-        if error_of(section.title) in recording:
-            for unit, size in section.sizes(recording[error_of(section.title)]):
+        name = error_of(section.title)
+        if name in recording:
+            for unit, size in section.sizes(recording.get(f"true_{name}", recording[name])):
                 yield section, section.unit_among(units) if unit == JOINT else unit, size

@@ -89,6 +89,7 @@ _TABLE = (
     Signal("true_ee_position", "m", "(T, 3)", "the end effector at true_q", _END),
     Signal("pointing_error", "", "(T,)", "cos(alpha_d) - cos(alpha), positive outside the cone",
            _END),
+    Signal("true_pointing_error", "", "(T,)", "pointing_error at true_q", _END),
     Signal("control_point_distance", "m", "(T, K)", "to the nearest obstacle", _DISTANCES),
     Signal("minimal_distance", "m", "(T,)", "smallest distance of a control point, eq. (31)",
            _DISTANCES),
@@ -117,6 +118,8 @@ _TABLE = (
     Signal("task_error_*", "", "(T, m)", "error of a task of [[tasks]], as the task defines it; "
            "\"_\" for a space in its name"),
     Signal("task_position_*", "m", "(T, 3)", "the point or centre of mass that the task moves"),
+    Signal("true_task_error_*", "", "(T, m)", "task_error_NAME at true_q"),
+    Signal("true_task_position_*", "m", "(T, 3)", "task_position_NAME at true_q"),
     Signal("planned_acceleration", "joint/s^2", "(T, n)", "the answer at level \"torque\", NaN "
            "where there was none"),
     Signal("planned_force", "N", "(T, P, 3)", "on each contact point in world axes, as "

@@ -116,6 +116,7 @@ def _about_rows(comparison: Comparison) -> str:
 def _group(comparison: Comparison, name: str, runs: Sequence[Run]) -> Markup:
     """Return the article about the runs of one group."""
     found, look, judged = motions(runs), looks(run.label for run in runs), verdicts(runs)
+    parted = partings(runs)
     room = min(_REPLAY_BYTES, _REPLAYS_BYTES // len(comparison.groups()))
     moved = {"replay": replay(name, found, room),
              "panels": sections.multiples(name, found, look),
@@ -125,7 +126,8 @@ def _group(comparison: Comparison, name: str, runs: Sequence[Run]) -> Markup:
                   **_about(name, runs), **_picture(name, found, look),
                   **{"replay": "", "panels": "", "overlays": "", **moved},
                   numbers=sections.numbers(runs, look), stack=sections.stack(name, runs, look),
-                  partings=[str(one) for one in partings(runs)], bound=BOUND,
+                  partings=[str(one) for one in parted],
+                  bound=f"{BOUND:.0e} {parted[0].unit}" if parted else "",
                   commands=commands(comparison, runs),
                   settings=[(run, ", ".join(f"{name} = {value!r}" for name, value in
                                             run.settings.items()) or "none") for run in runs],

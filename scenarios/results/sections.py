@@ -1,7 +1,6 @@
 """The sections of the page: numbers with the best marked, events, settings, figures."""
 
 from collections.abc import Iterable, Mapping, Sequence
-from typing import Any
 
 import numpy as np
 from markupsafe import Markup
@@ -17,6 +16,7 @@ from scenarios.draw.figures.panels import Draw, Panel
 from scenarios.draw.figures.timeline import tasks, timeline
 from scenarios.measure.motions import ALIKE, Motion, motions
 from scenarios.measure.runs import Run, caveats, table
+from scenarios.measure.safety import units_of
 from scenarios.recording.facts import resolver_facts
 from scenarios.recording.recording import Recording
 from scenarios.templates import render
@@ -113,10 +113,11 @@ def multiples(name: str, found: Sequence[Motion], looks: Mapping[str, Look]) -> 
                 (one, svg(small[one.label], f"{name}, {one.label}: {panel.title}"))
                 for one in found if one.label in small]))
     same = [f"{listed(one.labels)} are the same motion "
-            + (f"to {one.apart:.0e} rad" if one.apart else "to the last bit")
+            + (f"to {one.apart:.0e} {units_of(one.recording)}" if one.apart else "to the last bit")
             for one in found if len(one.runs) > 1]
     said = "Over time [s], on equal axes." + (
-        f" Drawn once: {'; '.join(same)} (within {ALIKE:.0e} rad)." if same else "")
+        f" Drawn once: {'; '.join(same)} (within {ALIKE:.0e} "
+        f"{units_of(found[0].recording)})." if same else "")
     return render("results/panels.html", cards=cards, beside=min(len(found), 5), looks=looks,
                   said=said) if cards else Markup()
 
@@ -125,8 +126,9 @@ def _key(figures: Iterable[Figure]) -> dict[str, str]:
     """Return the legend of a panel's joints or tasks, if colours mean the same in all runs."""
     keys = []
     for fig in figures:
-        drawn: Any = fig.axes[0].get_legend_handles_labels()
-        keys.append({label: line.get_color() for line, label in zip(*drawn, strict=True)})
+        drawn = {str(line.get_label()): str(line.get_color()) for line in fig.axes[0].lines}
+        keys.append({label: colour for label, colour in drawn.items()
+                     if not label.startswith("_child")})  # matplotlib's names of those without
     colours = list(keys[0].values())
     clear = set(colours) <= set(drawing.JOINTS) and len(set(colours)) == len(colours)
     return keys[0] if clear and all(one == keys[0] for one in keys) else {}
@@ -143,7 +145,8 @@ def overlays(name: str, runs: Sequence[Run], found: Sequence[Motion],
         figs.append(("Distance from the path [mm]",
                      _overlay(panels.position_error, moved, looks)))
     if len({one.scenario.name for one in recordings.values()}) < len(recordings):
-        figs.append((f"Joint difference from {next(iter(recordings))} [rad]",
+        first, one = next(iter(recordings.items()))
+        figs.append((f"Joint difference from {first} [{units_of(one)}]",
                      _departure(recordings, looks)))
     timings = {run.label: run.timing or recordings[run.label] for run in runs
                if run.label in recordings}
@@ -195,7 +198,7 @@ def _overlay(draw: Draw, recordings: Mapping[str, Recording], looks: Mapping[str
 
 
 def _departure(recordings: Mapping[str, Recording], looks: Mapping[str, Look]) -> Figure:
-    """Return the largest joint difference from the first run over time [rad], logarithmic."""
+    """Return the largest joint difference from the first run over time, logarithmic."""
     fig, (ax,) = drawing.figure(width=4.9, height=2.7)
     first, *others = recordings
     reference = recordings[first]

@@ -2,6 +2,7 @@
 
 import json
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -17,6 +18,7 @@ from scenarios.config import Scenario, ScenarioError, load, members, shipped
 from scenarios.config.distributions import flat
 from scenarios.config.reference import keys_of, sections
 from scenarios.config.resolvers import default_resolvers
+from scenarios.config.sampling import drawn
 from scenarios.config.validation import _table, tag_at
 from scenarios.measure.motions import motions, partings
 from scenarios.measure.runs import Run
@@ -82,9 +84,9 @@ def test_a_file_is_beside_the_one_that_names_it_or_in_the_working_directory_of_a
     (tmp_path / "varied.toml").write_text(f'extends = "ellipse"\nvariation = {varied}\n')
     (tmp_path / "sweep.toml").write_text(
         f'name = "sweep"\nscenarios = ["ellipse"]\nsamples = 1\nparameters = {varied}\n')
-    for drawn in (load("../varied.toml").variation, load_sweep("../sweep.toml").parameters):
-        assert drawn["robot.model"].choice == (f"{tmp_path}/a.urdf", "kuka_lwr")
-        assert drawn["a.path.file"].choice == (f"{tmp_path}/b",)
+    for keys in (load("../varied.toml").variation, load_sweep("../sweep.toml").parameters):
+        assert keys["robot.model"].choice == (f"{tmp_path}/a.urdf", "kuka_lwr")
+        assert keys["a.path.file"].choice == (f"{tmp_path}/b",)
     assert found.with_changes({"robot.model": "c.urdf"}).robot.model == f"{tmp_path}/base/c.urdf"
 
 
@@ -204,6 +206,14 @@ def test_a_resolver_that_cannot_resolve_a_scenario_is_not_run_and_is_named(tmp_p
     assert limited.with_changes({"limits.place": "guard"}).asks == "equalities"
 
 
+def test_a_joint_whose_name_has_a_dot_is_changed_and_varied_by_its_name():
+    own = load("ellipse", {"start.joints": {"hinge.001": 0.1, "hinge": 0.2},
+                           "variation": {"start.joints.hinge.001": {"around": 0.05}}})
+    changed = own.with_changes({"start.joints.hinge.001": 0.3})
+    assert changed.start.joints == {"hinge.001": 0.3, "hinge": 0.2}
+    assert abs(drawn(own, own.variation, 0, 0)["start.joints.hinge.001"] - 0.1) <= 0.05
+
+
 # Where strict resolvers part: the tick, and what was different before it.
 def run_of(spec, q=None, fault=None, **changed):
     scenario, q = asked(spec), np.zeros((5, 7)) if q is None else q
@@ -236,6 +246,18 @@ def test_runs_part_at_a_tick_for_a_reason_that_is_not_after_it(other, tick, why)
     assert (one.tick, one.largest) == (tick, np.inf if tick == 2 else 1e-3)
     assert f"at tick {tick} ({tick}.00 s), by " in str(one)
     assert why in one.why
+
+
+@pytest.mark.parametrize("units", [("m",) * 7, ("rad", *("m",) * 6)])
+def test_runs_of_joints_that_slide_part_by_metres(units):
+    runs = [run_of("recursive"), run_of("hqp", away_from(3))]
+    for run in runs:
+        facts = run.recording.facts
+        robot = replace(facts.robot, velocity_units=units)
+        vars(run.recording)["facts"] = replace(facts, robot=robot)
+    unit = " or ".join(dict.fromkeys(units))
+    (one,) = partings(runs)
+    assert f"by more than 1e-06 {unit} at tick 3 (3.00 s), by 0.001 {unit} at most" in str(one)
 
 
 def test_resolvers_that_are_not_strict_need_not_agree():

@@ -222,6 +222,23 @@ def test_levels_and_sides_that_come_and_go_are_all_that_is_said():
     assert said(one, opened) == ["stack: the upper side of row 0 in box vanished"]
 
 
+def test_tasks_are_judged_by_where_the_robot_truly_is_wherever_a_file_lists_them():
+    own = load("ellipse", {"avoidance": None, "pointing.alpha_d": 5.0, "control.duration": 0.2,
+                           "control.stack": "hierarchical", "control.resolver": "hcod",
+                           "plant.measurement": {"position_noise": 0.003}})
+    sections = own.model_dump(mode="json")
+    position, pointing = (
+        {**{key: sections[name][key] for key in ("stiffness", "damping", *more)},
+         "kind": name, "frame": "end_effector"}
+        for name, more in (("position", ["path"]), ("pointing", ["axis", "alpha_d"])))
+    listed = own.with_changes({"position": None, "pointing": None, "tasks": [position, pointing]})
+    runs = [simulate(one) for one in (own, listed)]
+    np.testing.assert_array_equal(runs[0]["q"], runs[1]["q"])
+    apart = np.abs(runs[0]["true_pointing_error"] - runs[0]["pointing_error"]).max()
+    assert 1e-4 < apart < 0.1
+    assert goals(runs[0])[:2] == goals(runs[1])[:2]
+
+
 def test_an_answer_that_the_resolver_does_not_give_is_not_blamed_on_the_rows():
     before = tick(WIDE, ((1.0, 0.0), 0.5))
     (text,) = said(before, before._replace(x=np.array([-0.9, 0.0])))

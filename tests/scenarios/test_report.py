@@ -17,12 +17,14 @@ from hierarchy.errors import HierarchyError
 from scenarios import load, save, simulate
 from scenarios.cell.sensors.sensor import packed_laws
 from scenarios.draw.figures import drawing, letter, picture, timeline
+from scenarios.draw.figures.palette import looks
 from scenarios.measure.metrics import Metric
 from scenarios.measure.motions import motions
 from scenarios.measure.runs import Run, table
 from scenarios.measure.verdict import Comparison
 from scenarios.recording.recording import Event
 from scenarios.results import page as results_page
+from scenarios.results import sections
 from scenarios.results.page import comparison_page as page
 from scenarios.results.page import run_command
 from scenarios.scene.drawn import scene
@@ -60,9 +62,10 @@ def test_the_best_of_each_row_is_marked(runs, label, marked):
     assert best(next(row for row in table(runs) if row.label.startswith(label))) == marked
 
 
-def test_units_of_joints_that_turn_and_of_those_that_slide_are_not_mixed():
+@pytest.mark.parametrize("units", [("rad", "m"), ("rad or m", "rad or m"), ("rad", "rad or m")])
+def test_units_of_joints_that_turn_and_of_those_that_slide_are_not_mixed(units):
     runs = [made(LETTER), made(LETTER, scenario=asked(name="other"))]
-    for run, unit in zip(runs, ("rad", "m"), strict=True):
+    for run, unit in zip(runs, units, strict=True):
         vars(run)["metrics"] = {"excess": Metric("excess", "Beyond", 0.5, unit)}
     (row,) = table(runs)
     assert (row.unit, *(cell.text for cell in row.cells)) == ("rad or m", "0.500", "0.500")
@@ -202,13 +205,17 @@ def test_a_joint_has_one_colour_in_a_figure_of_two_runs():
     assert len(first) == 8
 
 
-def test_a_joint_whose_name_begins_with_an_underscore_is_in_the_legend():
-    """matplotlib leaves such labels out of its own."""
+@pytest.mark.parametrize("name", ["_{}", r"${}\q$"])
+def test_a_joint_is_in_the_legend_whatever_its_name(name):
+    """matplotlib leaves labels with an underscore out of its own, and reads others as formulas."""
     run = recording()
-    robot = dataclasses.replace(run.facts.robot, velocity_names=tuple(f"_{i}" for i in range(7)))
+    robot = dataclasses.replace(run.facts.robot, velocity_names=tuple(map(name.format, range(7))))
     run = dataclasses.replace(run, facts=dataclasses.replace(run.facts, robot=robot))
     fig = letter.stacked([(run, [letter.PANEL["joint-velocities"]])], "")
+    fig.draw_without_rendering()
     assert [text.get_text() for text in fig.legends[0].texts] == [*robot.velocity_names]
+    cards = sections.multiples("", motions([Run(run.scenario, "own", "own", run)]), looks(["own"]))
+    assert all(name in cards for name in robot.velocity_names)
 
 
 def test_a_picture_links_the_body_with_the_surface_and_shows_where_listed_tasks_are_to_go(

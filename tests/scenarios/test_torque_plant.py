@@ -232,6 +232,14 @@ def test_a_floor_with_less_friction_than_the_controller_counts_on_is_named():
         "(plant.friction): it may slip"]
 
 
+def test_a_contact_may_be_called_as_something_else_in_the_scene():
+    run = simulate(load("crawl", {"control.duration": 0.002, "contacts.0.name": "the floor",
+                                  "contacts.1.name": "capsule trunk",
+                                  "plant.self_collision": True}))
+    assert run.fault is None
+    assert (run["floor_force"][:, :, 2] > 0.0).all()
+
+
 def test_a_joint_that_passes_its_stop_ends_the_run_with_a_fault():
     """No torque within the limits stops an elbow at 40 rad/s within the way that it has."""
     v, name = np.zeros(ROBOT.n), "left_elbow"

@@ -42,6 +42,8 @@ def test_a_live_run_that_nobody_touches_is_the_run_itself_and_starts_again_with_
     assert "changed" not in found
     for name in ("t", "q", "v", "command", "order"):
         assert (found[name] == recording[name]).all(), name
+    live.change({"pointing.alpha_d": 15.0})
+    assert live.changes == [], "they are for the next run"
     live = Live(LIMITED)
     ticks(live, 10)
     live.drag(0, (3.0, 4.0, 0.0))  # as far as it may go
@@ -57,6 +59,63 @@ def test_a_live_run_that_nobody_touches_is_the_run_itself_and_starts_again_with_
     assert not live.obstacles.offset.any()
     ticks(live, 1)
     np.testing.assert_array_equal(live.recording()["q"][0], recording["q"][0])
+
+
+@pytest.mark.parametrize(("name", "changes", "count"), [
+    ("ellipse", {"control.jacobian_derivative": "difference"}, 120),
+    ("ellipse-limits", {"control.level": "velocity", "plant": {"kind": "mujoco"},
+                        "limits.acceleration": 3.0}, 60),
+    ("ellipse", {"control.transition": "blend", "control.transition_time": 0.1}, 380),
+    ("step", {"control.resolver": "merged"}, 60),
+    ("ellipse-limits", {"start.v": [0.2] * 7, "control.policy": {
+        "deadline": 1e-9, "overrun": "stop"}}, 30)],
+    ids=["differences", "lag", "transition", "torque step and memory", "stop"])
+def test_a_change_to_the_same_settings_changes_no_command(name, changes, count):
+    lives = [Live(load(name, changes)) for _ in range(2)]
+    for live, changed in zip(lives, (False, True), strict=True):
+        ticks(live, count - 20)
+        if changed:
+            live.switch("own")
+        ticks(live, 20)
+    alone, other = (live.recording() for live in lives)
+    assert alone.ticks == other.ticks
+    np.testing.assert_array_equal(alone["command"], other["command"])
+    assert lives[0].controller.policy.fault == lives[1].controller.policy.fault
+
+
+def test_the_last_good_command_is_held_across_a_change():
+    live = Live(LIMITED)
+    ticks(live, 5)
+    live.change({"control.policy": {"deadline": 1e-9, "overrun": "hold"}})
+    ticks(live, 1)
+    found = live.recording()
+    assert found.events == ((5, "overrun", "hold"),)
+    np.testing.assert_array_equal(found["command"][5], found["command"][4])
+
+
+CAMERA = {"kind": "camera", "width": 64, "height": 48, "fx": 52.0, "fy": 52.0, "rate": 100.0,
+          "latency": 0.01}
+
+
+@pytest.mark.parametrize(("name", "changes"), [("strictness", {}), ("ellipse", {"sensor": CAMERA})])
+def test_a_live_run_has_what_is_looked_at_in_each_tick(name, changes):
+    scenario = load(name, {"control.duration": 0.02, **changes})
+    live, recording = Live(scenario), simulate(scenario)
+    ticks(live, 1000)
+    found = live.recording()
+    assert found.signals.keys() == recording.signals.keys()
+    for signal, values in recording.signals.items():
+        if not signal.startswith("time_"):
+            np.testing.assert_array_equal(found[signal], values, signal)
+
+
+def test_a_camera_goes_on_seeing_when_what_is_avoided_changes():
+    live = Live(load("ellipse", {"sensor": CAMERA}))
+    ticks(live, 15)
+    live.change({"avoidance.far": 0.22})
+    ticks(live, 15)
+    blind = [event.tick for event in live.recording().events if event.kind == "stale"]
+    assert blind == list(range(10)), "before the first image"
 
 
 def test_a_jump_that_a_hand_has_made_is_not_explained_by_rows_without_it():

@@ -56,13 +56,18 @@ def test_check_says_that_no_starts_can_be_drawn_from_a_variation_of_unknown_keys
     assert said.startswith("no sampled starts: variation.start.qq: scenario 'ellipse': unknown key")
 
 
-def test_check_says_which_faults_and_pushes_come_after_the_run():
-    fault = {"kind": "stale", "duration": 0.1}
-    late = load("stand-push", {"faults": [{**fault, "at": 0.0}, {**fault, "at": 9.0}],
-                               "control.duration": 0.2, "plant.pushes.0.at": 0.3})
-    assert [one for one in first_tick(late).warnings if "after" in one] == [
+def test_check_says_which_faults_and_pushes_come_after_the_run_or_between_two_ticks():
+    faults = [{"kind": "stale", "at": at, "duration": duration}
+              for at, duration in ((0.0, 0.1), (9.0, 0.1), (0.05, 0.0004), (0.0502, 0.0004))]
+    pushes = [{"joint": "trunk_yaw", "force": 9.0, "at": at, "duration": 0.0004}
+              for at in (0.3, 0.05, 0.0502)]
+    late = load("stand-push", {"faults": faults, "control.duration": 0.2, "plant.pushes": pushes})
+    between = "for 0.0004 s, it falls between two ticks of 0.001 s"
+    assert [one for one in first_tick(late).warnings if one[:5] in ("fault", "plant")] == [
         "faults.1.at = 9 s is after the run, which ends at 0.2 s",
-        "plant.pushes.0.at = 0.3 s is after the run, which ends at 0.2 s"]
+        f"faults.2 does nothing: from 0.05 s, {between}",
+        "plant.pushes.0.at = 0.3 s is after the run, which ends at 0.2 s",
+        f"plant.pushes.2 does nothing: from 0.0502 s, {between}"]
 
 
 def test_rounding_of_a_robot_at_rest_at_its_targets_is_not_said_to_be_missed():

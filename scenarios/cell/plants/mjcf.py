@@ -140,7 +140,7 @@ def on_floor(robot: Robot, contacts: Contacts, floor: TorqueSection, timestep: f
 
     A sole is a box in the place of its corners, a point a small ball; nothing else touches
     anything, except capsules with `floor.self_collision`. Bodies are named "body JOINT", geometries
-    by their contacts. Actuators are the torques of the actuated joints. What the robot couples or
+    "contact CONTACT". Actuators are the torques of the actuated joints. What the robot couples or
     closes are equalities. Raises ScenarioError unless each joint, but for that of a floating base,
     turns about or slides along one axis.
     """
@@ -149,12 +149,13 @@ def on_floor(robot: Robot, contacts: Contacts, floor: TorqueSection, timestep: f
     add(world, "geom", type="plane", name="the floor", size=(20, 20, 1), pos=(0, 0, floor.height))
     elements, pairs = _bodies(world, robot, floor, q), add(root, "contact")
     for contact in contacts.contacts:
-        add(elements[contact.frame.joint], "geom", name=contact.name, contype="0",
+        touching = f"contact {contact.name}"
+        add(elements[contact.frame.joint], "geom", name=touching, contype="0",
             conaffinity="0", **_shape(contact))
         # MuJoCo raises the normal force of a sliding contact with the friction that it would take
         # to stop it at once; that of one that is to slide is softer, and the hand does not hop.
         along = _SLIDING if contact.slides else floor.softness
-        add(pairs, "pair", geom1="the floor", geom2=contact.name, condim="3",
+        add(pairs, "pair", geom1="the floor", geom2=touching, condim="3",
             friction=(floor.friction, floor.friction, 0, 0, 0), solref=(floor.softness, 1.0),
             solreffriction=(along, 1.0))
     if floor.self_collision:

@@ -165,7 +165,7 @@ class Touch:
 
     def __init__(self, mujoco: Any, model: Any, contacts: Contacts) -> None:
         self._force_of, self._model = mujoco.mj_contactForce, model
-        self._geoms = [model.geom(name).id for name in contacts.names]
+        self._geoms = [model.geom(f"contact {name}").id for name in contacts.names]
         self._sole = [contact.is_surface for contact in contacts.contacts]
         self._slides = [contact.slides for contact in contacts.contacts]
         self._of_geom = {geom: c for c, geom in enumerate(self._geoms)}

@@ -127,6 +127,13 @@ class DepthSensor:
         state.measurement = seen
         return seen
 
+    def follow(self, before: "DepthSensor") -> None:
+        """Continue with the frames of another sensor with the same section."""
+        self._coming, self._current = before._coming, before._current
+        self._frame, self._now, self.reading = before._frame, before._now, before.reading
+        self.measurement.stamp, self.measurement.blind = (
+            before.measurement.stamp, before.measurement.blind)
+
     def _take(self, frame: int, state: State) -> None:
         if self.stopped:
             return

@@ -16,8 +16,7 @@ from scenarios.cell.build import build
 from scenarios.config import Scenario, ScenarioError
 from scenarios.config.sections.plant import KinematicSection
 from scenarios.loop.controller import Controller
-from scenarios.loop.recorder import Recorder
-from scenarios.loop.simulation import rehearsed, tick
+from scenarios.loop.simulation import rehearsed, tick, watching
 from scenarios.measure.judging import Fates, completed
 from scenarios.measure.run_folder import save
 from scenarios.measure.verdict import verdict
@@ -52,7 +51,7 @@ class Live:
         self.fault: str | None = None
         self.controller = Controller(self.scenario)
         self.ticks = control.ticks
-        self.recorder = Recorder(self.controller, self.ticks)
+        self.recorder, self._fates = watching(self.controller, self.ticks)
         self.changes: list[dict[str, Any]] = []
         sensor = self.controller.cell.sensor
         self.obstacles = sensor.obstacles if sensor else None
@@ -84,9 +83,7 @@ class Live:
 
     def change(self, changes: Mapping[str, Any]) -> None:
         """Change the values of dotted keys of the scenario."""
-        self._take_over(self.scenario.with_changes(changes))
-        self.changes += [{"t": self.t, "key": key, "value": value}
-                         for key, value in changes.items()]
+        self._take_over(self.scenario.with_changes(changes), changes)
 
     def switch(self, spec: str) -> None:
         """Continue with another resolver, "name" or "name:setting=value"."""
@@ -96,8 +93,7 @@ class Live:
         resolver = scenario.make_resolver()
         if not resolver.can_resolve(scenario.asks):
             raise ScenarioError(f"{spec} cannot resolve the {scenario.asks} of this stack")
-        self._take_over(scenario)
-        self.changes.append({"t": self.t, "key": "control.resolver", "value": spec})
+        self._take_over(scenario, {"control.resolver": spec})
 
     def drag(self, h: int, offset: ArrayLike) -> None:
         """Move obstacle h to `offset` (3,) [m] from its place or path, at limited speed."""
@@ -122,7 +118,7 @@ class Live:
             recording.signals["changed"] = self._changed[:ticks]
             recording.signals["obstacle_offset"] = self._offsets[:ticks]
         exact = self.begun.model_copy(update={"plant": KinematicSection()})
-        return completed(recording, build(exact))
+        return completed(recording, build(exact), self._fates)
 
     def frame(self) -> Scene:
         """Return what is drawn after the last tick, one frame: the state at its start."""
@@ -162,19 +158,22 @@ class Live:
                                                  encoding="utf-8")
         return recording
 
-    def _take_over(self, scenario: Scenario) -> None:
+    def _take_over(self, scenario: Scenario, changes: Mapping[str, Any]) -> None:
         """Continue with another scenario of the same robot and plant."""
         before = self.controller.cell
-        measurement, commanded = before.state.measurement, before.state.commanded
+        measurement = before.state.measurement
         try:
             controller = Controller(scenario, build(scenario, before))
         except HierarchyError:
-            before.state.measurement, before.state.commanded = measurement, commanded
+            before.state.measurement = measurement
             raise
+        controller.follow(self.controller)
         self.scenario = scenario
         if not self.over:  # what is seen after the end stays; a restart takes the new settings
             self.controller = controller
             self.recorder.follow(controller)
+            self.changes += [{"t": self.t, "key": key, "value": value}
+                             for key, value in changes.items()]
 
     def _drag_on(self) -> None:
         """Move dragged obstacles by one tick toward their targets."""
