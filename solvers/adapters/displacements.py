@@ -20,7 +20,6 @@ from hierarchy.words import listed
 from solvers.adapters.packing import CONTRADICT, GIVEN, ODD, damp, write_limits, write_tasks
 
 _AXES = ("x", "y", "z", "about x", "about y", "about z")
-_NO_DAMPING = 1e-12  # pink's default: a level above others leaves it out
 
 Names = Callable[[], Sequence[str]]
 Solve = Callable[[Hierarchy], Array]
@@ -91,8 +90,8 @@ class Packed:
     `tasks` is a task, or a sequence of tasks that share a level, weighted by their costs.
     Constraints have no cost, as in pink and mink.
     Without `pull` a task's lm_damping is refused. With it, a level minimises |A x - b|^2 +
-    weight |x - centre|^2 within the levels above: the last one by n rows more, the others by
-    `solve`, after which they keep the A x that it reaches.
+    weight |x - centre|^2 within the levels above: the last one by n rows, the others by `solve`,
+    after which they keep the A x that it reaches. Up to a weight of NO_DAMPING a level is exact.
 
     kept, sizes : what is in each level, and its rows. A (m, n), sides (2, m): the rows of all, m =
     `count`, and room for more; the first `always` are limits and constraints. What limits and tasks
@@ -201,17 +200,14 @@ class Packed:
 
     def hold(self, solve: Solve | None) -> None:
         """Make the last level, which weighs its step, ask for what it then reaches."""
-        x = None
-        if self.weight > _NO_DAMPING:
-            if solve is None:
-                raise HierarchyError(f"{self.names[-1]}: damped, and not the last level: what it "
-                                     "leaves to the levels below needs a resolver")
-            x = solve(self.hierarchy())
+        if solve is None:
+            raise HierarchyError(f"{self.names[-1]}: damped, and not the last level: what it "
+                                 "leaves to the levels below needs a resolver")
+        x = solve(self.hierarchy())
         first = self.count = self.count - self.sizes.pop()
         last = int(write_tasks(self.table, *self.last, self.period, self.A, self.sides, first))
         self.weight = 0.0
-        if x is not None:
-            self.sides[:, first:last] = self.A[first:last] @ x
+        self.sides[:, first:last] = self.A[first:last] @ x
         self.keep(self.kept.pop(), last)
 
     @property

@@ -100,6 +100,26 @@ SCENES = {
     "humanoid": humanoid_scene}
 
 
+@pytest.mark.parametrize(("lm_damping", "turned"), [(0.0, 0.0), (1e-6, 0.5)])
+def test_light_damping_leaves_every_answer_verified(lm_damping, turned):
+    """Beside the rows of the tasks, rounding hid those of the damping: one answer in five."""
+    import pink
+
+    robot, frames = Robot.named("humanoid"), ("left_hand", "right_hand", "left_foot")
+    for seed in range(20):
+        rng = np.random.default_rng(seed)
+        q = pin.integrate(robot.model, robot.rest, 0.2 * rng.normal(size=robot.model.nv))
+        low, high = robot.model.lowerPositionLimit, robot.model.upperPositionLimit
+        q[7:] = np.clip(q[7:], low[7:], high[7:])
+        there = pink.Configuration(robot.model, robot.model.createData(), q)
+        tasks = [frame_task(there, frame, 0.1 * rng.normal(size=3), gain=1.0, orientation=turned)
+                 for frame in frames]
+        for task in tasks:
+            task.lm_damping = lm_damping
+        for levels in (tasks, [tasks]):
+            assert solve_ik(there, levels, DT).any()
+
+
 @pytest.mark.parametrize("scene", SCENES)
 def test_one_level_is_the_exact_minimum_of_pinks_cost_under_its_limits(configuration, scene):
     import pink
