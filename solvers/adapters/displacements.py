@@ -6,7 +6,7 @@ is the velocity, and priorities are strict.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from copy import copy
 from functools import partial
 from typing import Any, NamedTuple, Protocol
@@ -63,8 +63,8 @@ def _row_names(packed: Packed) -> tuple[str, ...]:
     free -= packed.sizes[-1] if packed.weight else 0
     of_tasks = [name for level in packed.read for one in level
                 for name in _names_of(*one)][:free - above]
-    of_limits = [f"{name}, row {i}" for name, G, h in packed.limits for i, side in enumerate(h)
-                 if side < np.inf and np.count_nonzero(G[i]) != 1]
+    of_limits = [f"{name}, row {i}" for name, i, row, side in packed.limit_rows()
+                 if side < np.inf and np.count_nonzero(row) != 1]
     rows = of_limits + [""] * (above - len(of_limits)) + of_tasks
     rows += [f"{packed.names[-1]}, row {i}" for i in range(packed.count - free)]
     for i, (row, name) in enumerate(zip(packed.A, rows, strict=False)):
@@ -157,6 +157,12 @@ class Packed:
                 check_rows(name, G, np.full(len(h), -np.inf), h)
         return last
 
+    def limit_rows(self) -> Iterator[tuple[str, int, Array, float]]:
+        """Yield of each row of the limits its limit, its number there, the row (n,) and its h."""
+        places = [(name, i, side) for name, _, h in self.limits for i, side in enumerate(h)]
+        for (name, i, side), row in zip(places, self.table[:, :self.n], strict=False):
+            yield name, i, row, side
+
     def write(self, level: Sequence[_Read], weighted: bool = True) -> int:
         """Write the rows of tasks that share a level; return the row after them."""
         if not level:
@@ -225,7 +231,7 @@ class Packed:
 def _contradiction(packed: Packed, i: int) -> ContradictionError:
     """Return the error that names the two limits that leave unknown i no value."""
     bounds = [(side / packed.period / row[i], name, row[i] > 0.0)
-              for name, G, h in packed.limits for row, side in zip(G, h, strict=True)
+              for name, _, row, side in packed.limit_rows()
               if row[i] != 0.0 and np.count_nonzero(row) == 1]
     low, demands, _ = max(one for one in bounds if not one[2])
     high, allows, _ = min(one for one in bounds if one[2])

@@ -9,6 +9,7 @@ import numpy as np
 
 from hierarchy.jit import compiled, inlined
 from solvers.kernels.active_set.tableau import reflect_columns
+from solvers.kernels.tolerances import NEGLIGIBLE
 
 GIVEN = 4        # columns of the table after those of the unknowns
 ODD = -1         # returned for rows with numbers that are not finite, apart from missing limits
@@ -20,12 +21,15 @@ NO_DAMPING = 1e-12  # pink's default: such a weight only picks the shortest of e
 def write_limits(table, first, last, period, bounds, A, sides):
     """Write the rows G x <= h / period of the table from row 0 on, after them those on one unknown.
 
-    Of these each unknown that has any gets one row; bounds (2, n) are what they leave it. Rows with
-    infinite h are no limits. Returns the row after them, ODD or CONTRADICT.
+    Of these each unknown that has any gets one row; bounds (2, n) are what they leave it. Entries
+    that are rounding beside the largest become zero, and rows with infinite h are no limits.
+    Returns the row after them, ODD or CONTRADICT.
     """
-    n, row = A.shape[1], 0
+    n, row, least = A.shape[1], 0, 0.0
     for c in range(n):
         bounds[0, c], bounds[1, c] = -np.inf, np.inf
+        for i in range(first, last):
+            least = max(least, NEGLIGIBLE * abs(table[i, c]))
     for i in range(first, last):
         h = table[i, n] / period
         if np.isnan(h) or h == -np.inf:
@@ -36,7 +40,9 @@ def write_limits(table, first, last, period, bounds, A, sides):
         for c in range(n):
             if not np.isfinite(table[i, c]):
                 return ODD
-            if table[i, c] != 0.0:
+            if abs(table[i, c]) <= least:
+                table[i, c] = 0.0
+            else:
                 unknown, count = c, count + 1
         if count != 1:
             for c in range(n):

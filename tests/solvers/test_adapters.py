@@ -74,6 +74,12 @@ def wall(configuration, room, gain, safe):
                    safe_displacement_gain=safe)
 
 
+def still():
+    """Return a barrier of a frame that no joint moves."""
+    return SimpleNamespace(safe_displacement_gain=1.0, compute_qp_inequalities=lambda *_: None,
+                           compute_qp_objective=lambda _: (np.full((7, 7), np.inf), np.zeros(7)))
+
+
 def humanoid_scene(_):
     import pink
     from pink.tasks import ComTask
@@ -162,6 +168,16 @@ def test_limits_that_contradict_each_other_are_no_solution_and_named(configurati
         solve_ik(configuration, hand, DT, limits=[slow, sums])
 
 
+def test_rounding_in_a_row_of_a_limit_holds_no_joint(configuration):
+    """It froze the torso below a barrier for a frame on its axis."""
+    hand, bound = [frame_task(configuration)], limit((0, 70.0, 0.6))
+    free = solve_ik(configuration, hand, DT, limits=[bound])
+    faint = limit((2, 1e-15, 0.0), (2, -1e-15, 0.0))
+    np.testing.assert_allclose(solve_ik(configuration, hand, DT, limits=[faint, bound]), free,
+                               atol=1e-9)
+    assert abs(free[2]) > 1e-3
+
+
 def test_pinks_arguments_are_taken_in_pinks_order(configuration):
     import inspect
 
@@ -222,6 +238,8 @@ def rows_at(robot, configuration, level):
     (lambda c, r: solve_ik(c, [posture_task(Q)], 0.0), "period [s] = 0: expected"),
     (lambda c, r: solve_ik(c, [posture_task(Q)], DT, limits=[limit((0, np.nan, 1.0))]),
      "SimpleNamespace, row 0"),
+    (lambda c, r: solve_ik(c, [], DT, barriers=[still()]), "SimpleNamespace: "
+     "safe_displacement_gain / |J|^2 = inf: expected a finite number"),
     (lambda c, r: pink_hierarchy(c, arm_scene(c, lm_damping=1.0)[1], DT),
      "FrameTask of end_effector: lm_damping = 1"),
     (lambda c, r: pink_hierarchy(c, [posture_task(Q)], DT, barriers=[wall(c, 1.0, 1.0, 2.0)]),
