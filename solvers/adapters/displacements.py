@@ -259,6 +259,8 @@ def _read(task: Task, configuration: object, damped: bool) -> _Read:
                                              task.compute_jacobian(configuration))
     if J.ndim == 1 and e.ndim == 1:
         J = J.reshape(-1, 1)  # as pinocchio returns the Jacobian of a single joint
+    if J.shape[:1] != e.shape:
+        raise HierarchyError(f"{label(task)}: {J.shape} rows for {e.shape} values")
     return task, J, e
 
 

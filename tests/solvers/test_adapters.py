@@ -227,6 +227,12 @@ def rows_at(robot, configuration, level):
     return Stack([task], level).hierarchy(State.at(robot, Q))
 
 
+def short_task():
+    """Return a task with fewer rows than values, as LowAccelerationTask of a floating base."""
+    return SimpleNamespace(compute_jacobian=lambda _: np.eye(7)[1:], cost=1.0, gain=1.0,
+                           compute_error=lambda _: np.zeros(7))
+
+
 @pytest.mark.parametrize(("call", "said"), [
     (lambda c, r: solve_ik(c, [posture_task(Q)], DT, solver="proxpq"), "unknown resolver 'proxpq'"),
     (lambda c, r: solve_ik(c, [posture_task(Q)], DT, solver="hcod", guess=1),
@@ -246,6 +252,8 @@ def rows_at(robot, configuration, level):
      "Backing: safe_displacement_gain = 2"),
     (lambda c, r: pink_hierarchy(c, [[frame_task(c)], [posture_task(Q)]], DT, damping=1.0),
      "FrameTask of end_effector: damped, and not the last level"),
+    (lambda c, r: PinkTask(short_task(), c, DT), "SimpleNamespace: (6, 7) rows for (7,) values"),
+    (lambda c, r: solve_ik(c, [short_task()], DT), "SimpleNamespace: (6, 7) rows for (7,) values"),
     (lambda c, r: rows_at(r, c, "acceleration"), "pink does not support accelerations"),
     (lambda c, r: rows_at(r, renamed(r), "velocity"), "has the joints other")])
 def test_what_cannot_be_resolved_is_named(robot, configuration, call, said):
