@@ -9,6 +9,7 @@ import numpy as np
 
 from hierarchy.jit import compiled, inlined
 from solvers.kernels.active_set.tableau import reflect_columns
+from solvers.kernels.linalg.space import fill
 from solvers.kernels.tolerances import NEGLIGIBLE
 
 GIVEN = 4        # columns of the table after those of the unknowns
@@ -25,11 +26,10 @@ def write_limits(table, first, last, period, bounds, A, sides):
     that are rounding beside the largest become zero, and rows with infinite h are no limits.
     Returns the row after them, ODD or CONTRADICT.
     """
-    n, row, least = A.shape[1], 0, 0.0
+    n, row = A.shape[1], 0
+    least = NEGLIGIBLE * _largest(table[first:last, :n])
     for c in range(n):
         bounds[0, c], bounds[1, c] = -np.inf, np.inf
-        for i in range(first, last):
-            least = max(least, NEGLIGIBLE * abs(table[i, c]))
     for i in range(first, last):
         h = table[i, n] / period
         if np.isnan(h) or h == -np.inf:
@@ -57,6 +57,16 @@ def write_limits(table, first, last, period, bounds, A, sides):
 
 
 @inlined
+def _largest(rows):
+    """The largest entry of rows, without its sign."""
+    largest = 0.0
+    for i in range(rows.shape[0]):
+        for c in range(rows.shape[1]):
+            largest = max(largest, abs(rows[i, c]))
+    return largest
+
+
+@inlined
 def _write_bounds(bounds, A, sides, row):
     for c in range(A.shape[1]):
         if bounds[0, c] > bounds[1, c]:
@@ -74,9 +84,10 @@ def _write_bounds(bounds, A, sides, row):
 def write_tasks(table, first, last, period, A, sides, row):
     """Write the rows cost J x = -cost gain / period e of the table from `row` on.
 
-    Rows that cost nothing are left out. Returns the row after them, or ODD.
+    Rows that cost nothing are left out, and those that are rounding beside the largest entry of the
+    table so far become zero. Returns the row after them, or ODD.
     """
-    n = A.shape[1]
+    n, least = A.shape[1], NEGLIGIBLE * _largest(table[:last, :A.shape[1]])
     for i in range(first, last):
         cost = table[i, n + 1]
         if cost == 0.0:
@@ -88,6 +99,8 @@ def write_tasks(table, first, last, period, A, sides, row):
             A[row, c] = cost * table[i, c]
             if not np.isfinite(A[row, c]):
                 return ODD
+        if _largest(table[i:i + 1, :n]) <= least:
+            fill(A[row], 0.0)
         sides[0, row] = sides[1, row] = value
         row += 1
     return row

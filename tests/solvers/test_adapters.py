@@ -178,6 +178,18 @@ def test_rounding_in_a_row_of_a_limit_holds_no_joint(configuration):
     assert abs(free[2]) > 1e-3
 
 
+def test_a_level_of_rounding_alone_changes_nothing(configuration):
+    """As of two frames that no joint moves apart: no answer was verified."""
+    from pink.tasks import RelativeFrameTask
+
+    fixed = RelativeFrameTask("end_effector", "joint_7", 1.0, 1.0)
+    fixed.set_target(pin.SE3.Random())
+    assert 0.0 < np.abs(fixed.compute_jacobian(configuration)).max() < 1e-12
+    hand = frame_task(configuration)
+    np.testing.assert_allclose(solve_ik(configuration, [fixed, hand], DT),
+                               solve_ik(configuration, [hand], DT), atol=1e-9)
+
+
 def test_pinks_arguments_are_taken_in_pinks_order(configuration):
     import inspect
 
