@@ -23,7 +23,7 @@ def giving(solve: Callable[[Hierarchy, Array | None], _Kind], h: Hierarchy, leve
     that miss and what they give as room, see `Hierarchy.relaxed`. For the next such level the same
     answer is a witness if it meets all levels from there to this one; otherwise it is resolved
     again. Without an answer for one of them the resolution is that of the part. `memory` is that of
-    all these solves.
+    all these solves, as far as they came.
     """
     (A, lower, upper, sizes), offsets, give = h.rows, h.offsets, h.give
     sides = lower, upper = lower.copy(), upper.copy()
@@ -35,7 +35,9 @@ def giving(solve: Callable[[Hierarchy, Array | None], _Kind], h: Hierarchy, leve
         if found is None or misses(A, lower, upper, found.x, room, rows[1]):
             found = solve(part, before[len(after)])
             if found.status not in (Status.SOLVED, Status.INACCURATE):
-                found.memory = None
+                failed = found.status is Status.NUMERICAL_FAILURE
+                found.memory = None if failed else _joined([*after, found.memory,
+                                                            *before[len(after) + 1:]])
                 return found
             after.append(found.memory)
             inaccurate |= found.status is Status.INACCURATE
@@ -52,11 +54,12 @@ def giving(solve: Callable[[Hierarchy, Array | None], _Kind], h: Hierarchy, leve
 
 
 def _joined(memories: list[Array | None]) -> Array | None:
-    """Return memories one after the other, then the length of each; the last if that is not flat.
+    """Return memories one after the other, then the length of each; the last if they are not flat.
 
-    None if the last is none.
+    None if all are none.
     """
-    if memories[-1] is None or memories[-1].ndim != 1:
+    known = [memory for memory in memories if memory is not None]
+    if not known or known[-1].ndim != 1:
         return memories[-1]
     flat = [_NONE if memory is None else memory for memory in memories]
     return np.concatenate([*flat, [memory.size for memory in flat]])

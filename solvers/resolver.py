@@ -256,6 +256,7 @@ class Around(Resolver):
 
     def __post_init__(self) -> None:
         super().__post_init__()
+        expect(f"{self.name}: inner", self.inner, Resolver, "give make('tpm')")
         set_frozen(self, strict=self.inner.strict, accuracy=self.inner.accuracy)
 
     @property

@@ -67,11 +67,11 @@ def least_squares(tasks: Iterable[Any], barriers: Iterable[Any], configuration: 
 
 
 def exact(A: Array, b: Array, G: Array, h: Array, C: Array, d: Array, near: Array) -> Array:
-    """Return the x of least |A x - b| with G x <= h, C x = d, proved from the rows that act at
-    `near`; ArithmeticError where that proves nothing.
+    """Return the shortest x of least |A x - b| with G x <= h, C x = d, proved from the rows that
+    act at `near`; ArithmeticError where that proves nothing.
     """
     kept = (np.vstack([G, C]), np.concatenate([np.full(len(h), -np.inf), d]), np.append(h, d))
-    found = prove(Hierarchy.from_levels([kept, (A, b)], near), [near])
+    found = prove(Hierarchy.from_levels([kept, (A, b)]), [near])
     if not found.complete:
         raise ArithmeticError("the minimum could not be proved")
     return found.x

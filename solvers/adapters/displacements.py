@@ -6,7 +6,7 @@ is the velocity, and priorities are strict.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from copy import copy
 from functools import partial
 from typing import Any, NamedTuple, Protocol
@@ -20,7 +20,6 @@ from hierarchy.words import listed
 from solvers.adapters.packing import CONTRADICT, GIVEN, ODD, damp, write_limits, write_tasks
 
 _AXES = ("x", "y", "z", "about x", "about y", "about z")
-_NO_DAMPING = 1e-12  # pink's default: a level above others leaves it out
 
 Names = Callable[[], Sequence[str]]
 Solve = Callable[[Hierarchy], Array]
@@ -64,8 +63,8 @@ def _row_names(packed: Packed) -> tuple[str, ...]:
     free -= packed.sizes[-1] if packed.weight else 0
     of_tasks = [name for level in packed.read for one in level
                 for name in _names_of(*one)][:free - above]
-    of_limits = [f"{name}, row {i}" for name, G, h in packed.limits for i, side in enumerate(h)
-                 if side < np.inf and np.count_nonzero(G[i]) != 1]
+    of_limits = [f"{name}, row {i}" for name, i, row, side in packed.limit_rows()
+                 if side < np.inf and np.count_nonzero(row) != 1]
     rows = of_limits + [""] * (above - len(of_limits)) + of_tasks
     rows += [f"{packed.names[-1]}, row {i}" for i in range(packed.count - free)]
     for i, (row, name) in enumerate(zip(packed.A, rows, strict=False)):
@@ -91,8 +90,8 @@ class Packed:
     `tasks` is a task, or a sequence of tasks that share a level, weighted by their costs.
     Constraints have no cost, as in pink and mink.
     Without `pull` a task's lm_damping is refused. With it, a level minimises |A x - b|^2 +
-    weight |x - centre|^2 within the levels above: the last one by n rows more, the others by
-    `solve`, after which they keep the A x that it reaches.
+    weight |x - centre|^2 within the levels above: the last one by n rows, the others by `solve`,
+    after which they keep the A x that it reaches. Up to a weight of NO_DAMPING a level is exact.
 
     kept, sizes : what is in each level, and its rows. A (m, n), sides (2, m): the rows of all, m =
     `count`, and room for more; the first `always` are limits and constraints. What limits and tasks
@@ -158,6 +157,12 @@ class Packed:
                 check_rows(name, G, np.full(len(h), -np.inf), h)
         return last
 
+    def limit_rows(self) -> Iterator[tuple[str, int, Array, float]]:
+        """Yield of each row of the limits its limit, its number there, the row (n,) and its h."""
+        places = [(name, i, side) for name, _, h in self.limits for i, side in enumerate(h)]
+        for (name, i, side), row in zip(places, self.table[:, :self.n], strict=False):
+            yield name, i, row, side
+
     def write(self, level: Sequence[_Read], weighted: bool = True) -> int:
         """Write the rows of tasks that share a level; return the row after them."""
         if not level:
@@ -201,17 +206,14 @@ class Packed:
 
     def hold(self, solve: Solve | None) -> None:
         """Make the last level, which weighs its step, ask for what it then reaches."""
-        x = None
-        if self.weight > _NO_DAMPING:
-            if solve is None:
-                raise HierarchyError(f"{self.names[-1]}: damped, and not the last level: what it "
-                                     "leaves to the levels below needs a resolver")
-            x = solve(self.hierarchy())
+        if solve is None:
+            raise HierarchyError(f"{self.names[-1]}: damped, and not the last level: what it "
+                                 "leaves to the levels below needs a resolver")
+        x = solve(self.hierarchy())
         first = self.count = self.count - self.sizes.pop()
         last = int(write_tasks(self.table, *self.last, self.period, self.A, self.sides, first))
         self.weight = 0.0
-        if x is not None:
-            self.sides[:, first:last] = self.A[first:last] @ x
+        self.sides[:, first:last] = self.A[first:last] @ x
         self.keep(self.kept.pop(), last)
 
     @property
@@ -229,7 +231,7 @@ class Packed:
 def _contradiction(packed: Packed, i: int) -> ContradictionError:
     """Return the error that names the two limits that leave unknown i no value."""
     bounds = [(side / packed.period / row[i], name, row[i] > 0.0)
-              for name, G, h in packed.limits for row, side in zip(G, h, strict=True)
+              for name, _, row, side in packed.limit_rows()
               if row[i] != 0.0 and np.count_nonzero(row) == 1]
     low, demands, _ = max(one for one in bounds if not one[2])
     high, allows, _ = min(one for one in bounds if one[2])
@@ -257,6 +259,8 @@ def _read(task: Task, configuration: object, damped: bool) -> _Read:
                                              task.compute_jacobian(configuration))
     if J.ndim == 1 and e.ndim == 1:
         J = J.reshape(-1, 1)  # as pinocchio returns the Jacobian of a single joint
+    if J.shape[:1] != e.shape:
+        raise HierarchyError(f"{label(task)}: {J.shape} rows for {e.shape} values")
     return task, J, e
 
 

@@ -32,8 +32,8 @@ def solve_ik(configuration: Configuration, tasks: Tasks, dt: float,
     solver : the name of a resolver of this package, or a resolver. The name of a solver of
         qpsolvers is accepted: `hcod` answers in its place, and a warning says so once.
     damping, and lm_damping of a task, and safe_displacement_gain of a barrier: as in pink, within
-        the levels above. A level above others is exact up to 1e-12, pink's default; if its weights
-        are more it keeps what it reaches, which is one solve more.
+        the levels above. Up to 1e-12, pink's default, a level is exact and the shortest of equal
+        steps is taken; a level above others with more keeps what it reaches: one solve more.
     limits, barriers, constraints : as in pink. They come first, and must hold to `tolerance`
         [rad/s, or the unit of the row].
     of_the_solver : settings of the resolver; those of a solver of qpsolvers have no effect.

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from hierarchy.errors import HierarchyError, positive
+from hierarchy.errors import HierarchyError, number, positive
 from hierarchy.gate import check_rows
 from hierarchy.problem import Array, Hierarchy
 from hierarchy.records import set_frozen
@@ -145,7 +145,8 @@ def packed(configuration: Configuration, tasks: Tasks, dt: float, limits: Iterab
                                  f"{barrier.safe_displacement_gain:g} weighs a displacement "
                                  "against the tasks; set it to 0")
         H, c = barrier.compute_qp_objective(configuration)  # H = weight I, c = -weight dq_safe
-        weight = pull.weight + float(H[0, 0])
+        weight = pull.weight + number(f"{type(barrier).__name__}: safe_displacement_gain / |J|^2",
+                                      H[0, 0], 0.0)
         centre = pull.weight * pull.centre - c / dt
         pull = Pull(weight, centre / weight if weight > 0.0 else pull.centre)
     return Packed(configuration, partial(_joints, configuration.model), n, dt,

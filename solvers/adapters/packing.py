@@ -9,20 +9,25 @@ import numpy as np
 
 from hierarchy.jit import compiled, inlined
 from solvers.kernels.active_set.tableau import reflect_columns
+from solvers.kernels.linalg.space import fill
+from solvers.kernels.tolerances import NEGLIGIBLE
 
 GIVEN = 4        # columns of the table after those of the unknowns
 ODD = -1         # returned for rows with numbers that are not finite, apart from missing limits
 CONTRADICT = -2  # returned for bounds that no value meets, minus the number of the unknown
+NO_DAMPING = 1e-12  # pink's default: such a weight only picks the shortest of equal steps
 
 
 @compiled
 def write_limits(table, first, last, period, bounds, A, sides):
     """Write the rows G x <= h / period of the table from row 0 on, after them those on one unknown.
 
-    Of these each unknown that has any gets one row; bounds (2, n) are what they leave it. Rows with
-    infinite h are no limits. Returns the row after them, ODD or CONTRADICT.
+    Of these each unknown that has any gets one row; bounds (2, n) are what they leave it. Entries
+    that are rounding beside the largest become zero, and rows with infinite h are no limits.
+    Returns the row after them, ODD or CONTRADICT.
     """
     n, row = A.shape[1], 0
+    least = NEGLIGIBLE * _largest(table[first:last, :n])
     for c in range(n):
         bounds[0, c], bounds[1, c] = -np.inf, np.inf
     for i in range(first, last):
@@ -35,7 +40,9 @@ def write_limits(table, first, last, period, bounds, A, sides):
         for c in range(n):
             if not np.isfinite(table[i, c]):
                 return ODD
-            if table[i, c] != 0.0:
+            if abs(table[i, c]) <= least:
+                table[i, c] = 0.0
+            else:
                 unknown, count = c, count + 1
         if count != 1:
             for c in range(n):
@@ -47,6 +54,16 @@ def write_limits(table, first, last, period, bounds, A, sides):
         else:
             bounds[0, unknown] = max(bounds[0, unknown], h / table[i, unknown])
     return _write_bounds(bounds, A, sides, row)
+
+
+@inlined
+def _largest(rows):
+    """The largest entry of rows, without its sign."""
+    largest = 0.0
+    for i in range(rows.shape[0]):
+        for c in range(rows.shape[1]):
+            largest = max(largest, abs(rows[i, c]))
+    return largest
 
 
 @inlined
@@ -67,9 +84,10 @@ def _write_bounds(bounds, A, sides, row):
 def write_tasks(table, first, last, period, A, sides, row):
     """Write the rows cost J x = -cost gain / period e of the table from `row` on.
 
-    Rows that cost nothing are left out. Returns the row after them, or ODD.
+    Rows that cost nothing are left out, and those that are rounding beside the largest entry of the
+    table so far become zero. Returns the row after them, or ODD.
     """
-    n = A.shape[1]
+    n, least = A.shape[1], NEGLIGIBLE * _largest(table[:last, :A.shape[1]])
     for i in range(first, last):
         cost = table[i, n + 1]
         if cost == 0.0:
@@ -81,6 +99,8 @@ def write_tasks(table, first, last, period, A, sides, row):
             A[row, c] = cost * table[i, c]
             if not np.isfinite(A[row, c]):
                 return ODD
+        if _largest(table[i:i + 1, :n]) <= least:
+            fill(A[row], 0.0)
         sides[0, row] = sides[1, row] = value
         row += 1
     return row
@@ -104,37 +124,46 @@ def damp(table, first, last, pull, A, sides, row, end):
 
     `pull` is a weight, and the point (n,) that it pulls to; each task adds its lm_damping
     |gain cost e|^2.
-    Returns the sum; if it is not zero, n rows then stand for the level: what its best x misses says
-    nothing of that x.
+    Returns the sum, 0 for up to NO_DAMPING; if it is not zero, n rows then stand for the level:
+    what its best x misses says nothing of that x.
     """
     weight, centre = pull
     n, total = A.shape[1], weight
     for i in range(first, last):
         total += table[i, n + 3] * (table[i, n + 2] * table[i, n + 1] * table[i, n]) ** 2
-    if total > 0.0:
-        for c in range(n):
-            for j in range(n):
-                A[end + c, j] = np.sqrt(total) if j == c else 0.0
-            sides[0, end + c] = np.sqrt(total) * weight / total * centre[c]
-        _make_triangular(A, sides, row, end + n)
+    if total <= NO_DAMPING:
+        return 0.0
+    for c in range(n):
+        for j in range(n):
+            A[end + c, j] = np.sqrt(total) if j == c else 0.0
+        sides[0, end + c] = np.sqrt(total) * weight / total * centre[c]
+    _merge_rows(A, sides, row, end + n)
     return total
 
 
 @inlined
-def _make_triangular(A, sides, first, last):
+def _merge_rows(A, sides, first, last):
     """Replace the rows A x = side from first to last, of rank n, by n rows from `first` on.
 
-    |A x - side|^2 of the new ones is less by what no x can change.
+    |A x - side|^2 of the new ones is less by what no x can change. They are triangular rows that a
+    reflection mixes: those of the damping are far lighter than others, whose rounding would hide
+    them.
     """
     m, n = last - first, A.shape[1]
-    M, total = np.empty((m, n + 1)), np.empty(n + 1)
+    M, total = np.zeros((m, n + 1)), np.empty(n + 1)
     for i in range(m):
         for c in range(n):
             M[i, c] = A[first + i, c]
         M[i, n] = sides[0, first + i]
     for k in range(n):
         reflect_columns(M, k, m, k, k + 1, total)
+    for c in range(n + 1):
+        mean = 0.0
+        for i in range(min(c + 1, n)):
+            mean += M[i, c] / n
+        for i in range(n):
+            M[i, c] = (M[i, c] if i <= c else 0.0) - 2.0 * mean
     for i in range(n):
         for c in range(n):
-            A[first + i, c] = M[i, c] if c >= i else 0.0
+            A[first + i, c] = M[i, c]
         sides[0, first + i] = sides[1, first + i] = M[i, n]

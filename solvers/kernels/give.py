@@ -76,7 +76,8 @@ def solve_giving(A, lower, upper, sizes, x, record, settings, work):
     x (n + m + K n,): the reference, what the rows give, in K levels, and anything; on return the
     answer and, behind what rows give, the witnesses that were found. record: for each witness that
     of the levels down to the last that gives, zeros where none had to be looked for; then that of
-    all levels. settings, work, and the codes: as of `solve_hierarchy`.
+    all levels, as it was if a witness was not found. settings, work, and the codes: as of
+    `solve_hierarchy`.
     """
     (m, n), whole = A.shape, record.size - 3 * A.shape[0] - 3
     if exact_size(n, m, sizes.size) > work.size:
@@ -84,14 +85,14 @@ def solve_giving(A, lower, upper, sizes, x, record, settings, work):
     s, code, at = open_working_set(A, lower, upper, sizes, x[:n], record[whole:], settings, work)
     for i in range(m):
         code = code if x[n + i] >= 0.0 else NUMERICAL_FAILURE
-    last = record.size - 3
     if code == SOLVED:
         g = Giving(A, lower, upper, x[n:n + m], as_matrix(x[n + m:], (x.size - n - m) // n, n))
-        code, last = _find_witnesses(s, g, record[:whole], settings, work[at:])
-    if code not in (SOLVED, INACCURATE):
+        code = _find_witnesses(s, g, record[:whole], settings, work[at:])
+    if code == NUMERICAL_FAILURE:
         keep_staircase(lower, upper, record[whole:])
-        assign(record[record.size - 3:], record[last:])
-        return finish(x[:n], code) if code == NUMERICAL_FAILURE else code
+        return finish(x[:n], code)
+    if code not in (SOLVED, INACCURATE):
+        return code
     _begin(s, record[whole:])
     found = answer(s, record[whole:], settings, work[at:])
     return code if found == SOLVED else found
@@ -99,7 +100,7 @@ def solve_giving(A, lower, upper, sizes, x, record, settings, work):
 
 @inlined
 def _find_witnesses(s, g, record, settings, work):
-    """Write the witnesses and move the sides; return a code, and where the last record ends."""
+    """Write the witnesses and move the sides; return a code."""
     code, count, found, at, room, accurate = SOLVED, 0, 0, 0, 0, True
     for k in range(s.multiplier.shape[0] - 1):
         count = k + 1 if _gives(s, g, k) else count
@@ -115,7 +116,7 @@ def _find_witnesses(s, g, record, settings, work):
                 _relax(s, g, k)
                 found, room = found + 1, s.index[FIRST, k + 1]
     fill(record[at:], 0.0)
-    return INACCURATE if code == SOLVED and not accurate else code, at - 3
+    return INACCURATE if code == SOLVED and not accurate else code
 
 
 @inlined

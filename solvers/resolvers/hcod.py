@@ -17,7 +17,14 @@ from solvers.kernels.active_set.exact import (
 )
 from solvers.kernels.give import solve_giving
 from solvers.resolver import Handles, Resolution, Resolver, number, register, whole_number
-from solvers.status import SOLVED, TOO_SMALL, UNPROVED, Status
+from solvers.status import (
+    ITERATION_LIMIT,
+    NUMERICAL_FAILURE,
+    SOLVED,
+    TOO_SMALL,
+    UNPROVED,
+    Status,
+)
 from solvers.workspace import WORKSPACE, entry, run
 
 
@@ -112,7 +119,7 @@ class Hcod(Resolver):
     def _solve_giving(self, h: Hierarchy, memory: Array | None) -> Resolution:
         """Resolve h, some levels of which give, in one call of a kernel.
 
-        The memory is that of all solves; there is none where one of the witnesses was not found.
+        The memory is that of all solves. Where the limit ends that for a witness, it is reported.
         """
         if h.metric is not None or self.damping > 0.0:
             return super()._solve_giving(h, memory)
@@ -123,11 +130,13 @@ class Hcod(Resolver):
         x[:n], x[n:n + m], x[-1] = h.reference, h.give, np.nan
         record = warm_record(memory, count * part + size)
         code = run(entry(solve_giving), *h.rows, x, record, self._settings)
-        status = _SOLVED if code == SOLVED else Status(code)
-        found: Resolution = ActiveSetResolution(x[:n].copy(), status, record[-size:])
-        found.memory = None
-        if not isnan(x.item(-1)):
-            found.memory, found.witnesses = record, x[n + m:].reshape(count, n)
+        status, reported = _SOLVED if code == SOLVED else Status(code), record[-size:]
+        if (unfound := isnan(x.item(-1))) and code == ITERATION_LIMIT:
+            parts = record[:-size].reshape(count, part)
+            reported = parts[parts[:, -3:-1].any(axis=1)][-1]
+        found: Resolution = ActiveSetResolution(x[:n].copy(), status, reported)
+        found.memory = None if code == NUMERICAL_FAILURE else record
+        found.witnesses = None if unfound else x[n + m:].reshape(count, n)
         return found
 
 

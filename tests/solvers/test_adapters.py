@@ -74,6 +74,12 @@ def wall(configuration, room, gain, safe):
                    safe_displacement_gain=safe)
 
 
+def still():
+    """Return a barrier of a frame that no joint moves."""
+    return SimpleNamespace(safe_displacement_gain=1.0, compute_qp_inequalities=lambda *_: None,
+                           compute_qp_objective=lambda _: (np.full((7, 7), np.inf), np.zeros(7)))
+
+
 def humanoid_scene(_):
     import pink
     from pink.tasks import ComTask
@@ -98,6 +104,26 @@ SCENES = {
     "a barrier alone": lambda c: (c, [], {"barriers": [wall(c, 1.0, 9.0, 0.05)]}),
     "one row": lambda c: (c, [posture_task(Q + 0.1)], {}),
     "humanoid": humanoid_scene}
+
+
+@pytest.mark.parametrize(("lm_damping", "turned"), [(0.0, 0.0), (1e-6, 0.5)])
+def test_light_damping_leaves_every_answer_verified(lm_damping, turned):
+    """Beside the rows of the tasks, rounding hid those of the damping: one answer in five."""
+    import pink
+
+    robot, frames = Robot.named("humanoid"), ("left_hand", "right_hand", "left_foot")
+    for seed in range(20):
+        rng = np.random.default_rng(seed)
+        q = pin.integrate(robot.model, robot.rest, 0.2 * rng.normal(size=robot.model.nv))
+        low, high = robot.model.lowerPositionLimit, robot.model.upperPositionLimit
+        q[7:] = np.clip(q[7:], low[7:], high[7:])
+        there = pink.Configuration(robot.model, robot.model.createData(), q)
+        tasks = [frame_task(there, frame, 0.1 * rng.normal(size=3), gain=1.0, orientation=turned)
+                 for frame in frames]
+        for task in tasks:
+            task.lm_damping = lm_damping
+        for levels in (tasks, [tasks]):
+            assert solve_ik(there, levels, DT).any()
 
 
 @pytest.mark.parametrize("scene", SCENES)
@@ -140,6 +166,28 @@ def test_limits_that_contradict_each_other_are_no_solution_and_named(configurati
     with pytest.raises(NoSolutionFound, match=r"limits cannot all hold; at best these are violated:"
                        r" SimpleNamespace, row 0 by .*joint_1 by"):
         solve_ik(configuration, hand, DT, limits=[slow, sums])
+
+
+def test_rounding_in_a_row_of_a_limit_holds_no_joint(configuration):
+    """It froze the torso below a barrier for a frame on its axis."""
+    hand, bound = [frame_task(configuration)], limit((0, 70.0, 0.6))
+    free = solve_ik(configuration, hand, DT, limits=[bound])
+    faint = limit((2, 1e-15, 0.0), (2, -1e-15, 0.0))
+    np.testing.assert_allclose(solve_ik(configuration, hand, DT, limits=[faint, bound]), free,
+                               atol=1e-9)
+    assert abs(free[2]) > 1e-3
+
+
+def test_a_level_of_rounding_alone_changes_nothing(configuration):
+    """As of two frames that no joint moves apart: no answer was verified."""
+    from pink.tasks import RelativeFrameTask
+
+    fixed = RelativeFrameTask("end_effector", "joint_7", 1.0, 1.0)
+    fixed.set_target(pin.SE3.Random())
+    assert 0.0 < np.abs(fixed.compute_jacobian(configuration)).max() < 1e-12
+    hand = frame_task(configuration)
+    np.testing.assert_allclose(solve_ik(configuration, [fixed, hand], DT),
+                               solve_ik(configuration, [hand], DT), atol=1e-9)
 
 
 def test_pinks_arguments_are_taken_in_pinks_order(configuration):
@@ -191,6 +239,12 @@ def rows_at(robot, configuration, level):
     return Stack([task], level).hierarchy(State.at(robot, Q))
 
 
+def short_task():
+    """Return a task with fewer rows than values, as LowAccelerationTask of a floating base."""
+    return SimpleNamespace(compute_jacobian=lambda _: np.eye(7)[1:], cost=1.0, gain=1.0,
+                           compute_error=lambda _: np.zeros(7))
+
+
 @pytest.mark.parametrize(("call", "said"), [
     (lambda c, r: solve_ik(c, [posture_task(Q)], DT, solver="proxpq"), "unknown resolver 'proxpq'"),
     (lambda c, r: solve_ik(c, [posture_task(Q)], DT, solver="hcod", guess=1),
@@ -202,12 +256,16 @@ def rows_at(robot, configuration, level):
     (lambda c, r: solve_ik(c, [posture_task(Q)], 0.0), "period [s] = 0: expected"),
     (lambda c, r: solve_ik(c, [posture_task(Q)], DT, limits=[limit((0, np.nan, 1.0))]),
      "SimpleNamespace, row 0"),
+    (lambda c, r: solve_ik(c, [], DT, barriers=[still()]), "SimpleNamespace: "
+     "safe_displacement_gain / |J|^2 = inf: expected a finite number"),
     (lambda c, r: pink_hierarchy(c, arm_scene(c, lm_damping=1.0)[1], DT),
      "FrameTask of end_effector: lm_damping = 1"),
     (lambda c, r: pink_hierarchy(c, [posture_task(Q)], DT, barriers=[wall(c, 1.0, 1.0, 2.0)]),
      "Backing: safe_displacement_gain = 2"),
     (lambda c, r: pink_hierarchy(c, [[frame_task(c)], [posture_task(Q)]], DT, damping=1.0),
      "FrameTask of end_effector: damped, and not the last level"),
+    (lambda c, r: PinkTask(short_task(), c, DT), "SimpleNamespace: (6, 7) rows for (7,) values"),
+    (lambda c, r: solve_ik(c, [short_task()], DT), "SimpleNamespace: (6, 7) rows for (7,) values"),
     (lambda c, r: rows_at(r, c, "acceleration"), "pink does not support accelerations"),
     (lambda c, r: rows_at(r, renamed(r), "velocity"), "has the joints other")])
 def test_what_cannot_be_resolved_is_named(robot, configuration, call, said):

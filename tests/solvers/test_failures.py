@@ -131,6 +131,15 @@ def test_rows_whose_squares_underflow_are_a_failure_where_they_are_not_solved(re
     assert (res.status, res.x.any()) == (Status.NUMERICAL_FAILURE, False)
 
 
+@pytest.mark.parametrize("name", ["hcod", "merged", "tpm"])
+@pytest.mark.parametrize("size", [1e-308, 1e-310, 5e-324])
+def test_rows_at_the_end_of_the_range_of_numbers_are_solved(name, size):
+    """Below 2^-1024 the search for a unit for them never ended."""
+    res = make(name).solve(Hierarchy.from_levels([([[size, 0.0]], [size]), ([[0.0, size]], [0.0])]))
+    assert res.status is Status.SOLVED
+    np.testing.assert_allclose(res.x, [1.0, 0.0])
+
+
 @pytest.mark.parametrize("name", ["hcod", "recursive", "sns", "tpm"])
 @pytest.mark.parametrize("rank_tolerance", [1e-13, 1e-15, 1e-170, 0.0])
 def test_what_may_be_rounding_is_no_direction_without_a_rank_tolerance(name, rank_tolerance):

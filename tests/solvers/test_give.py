@@ -60,10 +60,22 @@ def test_any_memory_gives_the_same_answer_and_its_own_fewer_iterations(reach, me
     assert warm.iterations <= cold.iterations
     assert certify(h, warm.x, witnesses=warm.witnesses).certified
     assert (warm.active.shape, np.array_equal(*cold.witnesses)) == ((h.m,), met)
-    short = make("hcod", max_iterations=1).solve(h)
-    assert (short.status, short.memory) == (Status.ITERATION_LIMIT, None)
     for memory in (np.zeros(0), np.full(7, 9.0), hcod.solve(h.changed(give=None)).memory):
         np.testing.assert_allclose(hcod.solve(h, memory).x, cold.x, atol=1e-9)
+
+
+@pytest.mark.parametrize("metric", [None, np.eye(6)], ids=["one call", "in parts"])
+@pytest.mark.parametrize("most", [1, 2])
+def test_a_search_for_a_witness_goes_on_from_where_the_limit_ended_it(metric, most):
+    """It began anew with each solve, and never ended."""
+    for seed in range(8):
+        h, resolver, memory = problem(seed, 0.1), make("hcod", max_iterations=most), None
+        h.metric = metric
+        for _ in range(40):
+            res = resolver.solve(h, memory)
+            memory = res.memory
+            assert res.status is Status.SOLVED or "iteration limit" in explain(h, res)
+        np.testing.assert_allclose(res.x, make("hcod").solve(h).x, atol=1e-9)
 
 
 def test_solves_that_share_a_working_set_answer_as_separate_ones():

@@ -66,7 +66,9 @@ def test_the_code_that_documents_show_is_that_of_the_examples():
     assert all(block in examples for block in shown)
 
 
-ONCE = {"once.c": ["-std=c99", *STRICT], "once.cpp": ["-std=c++17", "-fno-exceptions", *STRICT],
+SIGNS = ["-Wconversion", "-Wsign-conversion"]
+ONCE = {"once.c": ["-std=c99", *STRICT, *SIGNS],
+        "once.cpp": ["-std=c++17", "-fno-exceptions", *STRICT, *SIGNS],
         "eigen.cpp": ["-std=c++17", "-DTASK_HIERARCHY_EIGEN", "-isystem", "/usr/include/eigen3"]}
 
 

@@ -334,6 +334,7 @@ def test_what_has_no_answer_is_refused_or_has_a_status():
     below = Hierarchy.from_levels([(np.eye(2), np.zeros(2))] * 2, names=["walls", "tip"])
     given = SMOOTH.solve_activated
     for call, said in (
+            (lambda: SetBased(inner="tpm"), "set-based: inner: expected a Resolver, got str 'tpm'"),
             (lambda: SET_BASED.solve(two), "walls, row 1: two sides, -1 <= a x <= 2"),
             (lambda: SMOOTH.solve(h), "walls, row 0: an inequality, 0 <= a x <= inf; smooth "
              "resolves equalities, and rows that come with an activation"),

@@ -49,6 +49,7 @@ PICKED, WHOLE, DIRTY, NEGLECTED, FINISHED, SEEN_LAST, FACTORED, SOUND = range(8)
 # In `scalar`: rank_tolerance, the largest number so far, the smallest pivot of a row over its norm
 # and the next one, the factor by which the data are those of the caller.
 TOLERANCE, SIZE, PIVOT, SECOND, SCALE = range(5)
+_LARGEST = 2.0**1023  # power of two
 
 
 class WorkingSet(NamedTuple):
@@ -180,7 +181,7 @@ def rescale(s, lower, upper, A, sides):
     most, sane, factor = 0.0, True, 1.0
     for i in range(s.A.shape[0]):
         most = max(most, abs(s.number[NORM, i]))
-    while most * factor < 0.5:
+    while most * factor < 0.5 and factor < _LARGEST:
         factor *= 2.0
     while most * factor > 1.0:
         factor *= 0.5

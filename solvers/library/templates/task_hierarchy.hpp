@@ -32,13 +32,14 @@ class Solver {
     for (const auto size : sizes_) m_ += size;
     const auto levels = static_cast<std::int64_t>(sizes_.size());
     if (th_work_size(n_, m_, levels) < 0) return;
-    A_.resize(m_ * n_);
-    lower_.resize(m_);
-    upper_.resize(m_);
-    x_.resize(n_);
-    reference_.resize(n_);
-    work_.resize(th_work_size(n_, m_, levels));
-    values_.resize(th_record_size(n_, m_, levels));
+    const auto unknowns = static_cast<std::size_t>(n_), rows = static_cast<std::size_t>(m_);
+    A_.resize(rows * unknowns);
+    lower_.resize(rows);
+    upper_.resize(rows);
+    x_.resize(unknowns);
+    reference_.resize(unknowns);
+    work_.resize(static_cast<std::size_t>(th_work_size(n_, m_, levels)));
+    values_.resize(static_cast<std::size_t>(th_record_size(n_, m_, levels)));
   }
   Solver(Solver &&) = default;  // a copy's record would have the numbers of another
   Solver &operator=(Solver &&) = default;
@@ -55,8 +56,8 @@ class Solver {
   double *row(std::int64_t i) noexcept { return A_.data() + i * n_; }
   // lower <= A x <= upper in row i; the second form is an equality.
   void sides(std::int64_t i, double lower, double upper) noexcept {
-    lower_[i] = lower;
-    upper_[i] = upper;
+    lower_.data()[i] = lower;
+    upper_.data()[i] = upper;
   }
   void sides(std::int64_t i, double target) noexcept { sides(i, target, target); }
   // The x preferred where the levels leave freedom: n entries.
