@@ -107,12 +107,13 @@ def tick(controller: Controller, recorder: Recorder, t: float,
         sound = recorder.write()
         recorder.stamp(controller.clock())
         recorder.look()
+        fault: str | None = getattr(plant, "fault", None) or None
     except (Exception, SystemExit) as error:  # a user's code, which may fail in any way
         return blamed(error)
     if not sound or (controller.policy.events and not (
             np.isfinite(plant.q).all() and np.isfinite(plant.v).all())):
         return _unsound(controller)
-    return getattr(plant, "fault", None)
+    return fault
 
 
 def _unsound(controller: Controller) -> str:

@@ -2,6 +2,7 @@
 
 import copy
 import pickle
+import re
 import shutil
 import sys
 from pathlib import Path
@@ -84,6 +85,28 @@ class Brittle(Task):
         return np.zeros((1, 7))
 '''
 
+ODD = '''
+import numpy as np
+from scenarios.measure.metrics import Metric
+
+@register("plants", "odd")
+class Odd(KinematicArm):
+    def __init__(self, robot, q, v, period, level, made: str = "", then: str = ""):
+        super().__init__(robot, q, v, period, level)
+        self.then, self.ticks = then, 0
+        exec(made)
+
+    def act(self, command):
+        super().act(command)
+        self.ticks += 1
+        if self.ticks > 10:
+            exec(self.then)
+
+@register("plants", "none")
+def none():
+    return None
+'''
+
 
 @pytest.fixture(autouse=True)
 def folder(tmp_path, monkeypatch, no_plugins):
@@ -163,6 +186,65 @@ def test_a_task_that_fails_is_named_and_what_was_run_is_kept(fault, said, comman
     for what in ("check", "run"):
         assert command(f"{what} own.toml --plugin doors_of_mine", code=2).err.strip() == (
             f"hierarchy: error: own.toml: {said}")
+
+
+def with_plant(folder, keys):
+    """Give the scenario another plant."""
+    (folder / "doors_of_mine.py").write_text(MODULE + ODD)
+    scenario = folder / "own.toml"
+    scenario.write_text(scenario.read_text().replace('"weak", share = 0.5', keys))
+
+
+@pytest.mark.parametrize(("keys", "said"), [
+    ('"odd", made = "self.q = None"', "'odd': q: expected 7 finite numbers, got NoneType None"),
+    ('"odd", made = "self.a = np.zeros(9)"', "'odd': a: expected 7 finite numbers, got ndarray"),
+    ('"odd", made = "self.extra = None"', "'odd': extra: expected a Mapping, got NoneType None"),
+    ('"odd", made = "self.extra = {\'push\': np.zeros(2)}"', "'odd': extra: signal 'push': float64 "
+     "of shape (1, 2), expected numbers of shape (1, 3)"),  # a run that nothing could read
+    ('"odd", made = "self.extra = {\'fault\': np.zeros(1)}"', "extra: unknown signal 'fault'"),
+    ('"odd", made = "self.extra = {\'q\': self.q}"', "extra: 'q', which the loop records"),
+    ('"none"', "'none': NoneType None has no method act")])
+def test_what_is_no_plant_is_refused_before_the_run(keys, said, command, folder):
+    with_plant(folder, keys)
+    text = command("run own.toml --plugin doors_of_mine --out a", code=2).err
+    assert "own.toml: plant of kind '" in text
+    assert said in text
+    assert text.count("\n") == 1
+
+
+@pytest.mark.parametrize(("fault", "said"), [
+    ("1 / 0", "plant of kind 'odd': ZeroDivisionError: division by zero"),
+    ("self.a = np.zeros(9)", "plant of kind 'odd': a or extra has changed: could not broadcast "
+     "input array from shape (9,) into shape (7,)"),  # was written over other memory
+    ("self.fault = np.ones(2)", "ValueError: The truth value of an array"),
+    ("self.fault = 'it fell'", "it fell")])
+def test_a_plant_that_fails_is_named_and_what_was_run_is_kept(fault, said, command, folder):
+    with_plant(folder, f'"odd", then = "{fault}"')
+    text = command("run own.toml --plugin doors_of_mine --out a", code=1).err
+    assert text.startswith(f"hierarchy: fault: {said}")
+    assert "from tick 10 on" in text
+    assert load_run("a").ticks in (10, 11)
+
+
+@pytest.mark.parametrize(("body", "said"), [
+    ("exit(4)", "metrics 'own' are left out: SystemExit: 4"),
+    ("yield Metric('stack_changes', 'S', 77.0, '')", "metrics 'own' are left out: others yield "
+     "'stack_changes' too"),
+    ("yield recording['q'].mean()", "what it yields[0]: expected a Metric, got float64")])
+def test_metrics_that_fail_are_left_out_and_the_run_is_kept(body, said, command, folder):
+    with_plant(folder, '"odd"')
+    with (folder / "doors_of_mine.py").open("a") as module:
+        module.write(f"\n@register('metrics', 'own')\ndef own(recording, by):\n    {body}\n")
+    with pytest.warns(UserWarning, match=re.escape(said)):
+        command("run own.toml --plugin doors_of_mine --out a")
+    assert '"value": 77.0' not in (folder / "a" / "metrics.json").read_text()
+
+
+def test_a_plant_that_reports_contacts_without_their_depth_keeps_its_run(command, folder):
+    with_plant(folder, '"odd", made = "self.extra = {\'contacts\': np.zeros(())}"')
+    with pytest.warns(UserWarning, match="'contacts' are left out: unknown signal 'contact_depth'"):
+        command("run own.toml --plugin doors_of_mine --out a")
+    assert not load_run("a")["contacts"].any()
 
 
 def test_a_finished_run_of_a_plugin_is_opened_with_the_plugin_only(command):
