@@ -63,7 +63,7 @@ def grouped(recording: Recording) -> dict[str, dict[str, NDArray[Any]]]:
     signals = {name: signal for name, signal in recording.of_ticks().items() if name != "t"}
     groups: dict[str, dict[str, NDArray[Any]]] = {}
     for name, signal in signals.items():
-        flat = signal.reshape(len(signal), -1) if signal.ndim > 2 else signal
+        flat = signal.reshape(len(signal), -1 if len(signal) else 0) if signal.ndim > 2 else signal
         of = known(name)
         groups.setdefault(of.topic if of else OTHER, {})[name] = flat
     groups["/stack"]["tasks"] = recording.stacks()

@@ -207,7 +207,8 @@ class Recorder:
         if cell.contacts is not None:
             answers = self._answers[rows].copy()
             signals |= {"planned_acceleration": answers[:, :n],
-                        "planned_force": answers[:, n:].reshape(len(answers), -1, 3)}
+                        "planned_force": answers[:, n:].reshape(
+                            len(answers), (answers.shape[1] - n) // 3, 3)}
         if self._blend is not None:
             signals["transition"] = self._weights[rows].copy()
         if log.distance.shape[1]:

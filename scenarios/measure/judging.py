@@ -120,7 +120,7 @@ class Rows:
         self._changed = recording.get("changed", np.zeros(recording.ticks, bool))
         self.meant = recording["command"] if level != "torque" else np.hstack([
             recording["planned_acceleration"],
-            recording["planned_force"].reshape(recording.ticks, -1)])
+            *recording["planned_force"].swapaxes(0, 1)])
         if cell.contacts:
             for t, x in zip(self._t, self.meant, strict=True):
                 last = self._carried[-1]

@@ -304,9 +304,62 @@ def test_a_name_of_an_entry_point_is_found_without_being_imported_first(group, l
     sys.modules.pop("entry_of_mine")
 
 
+@pytest.mark.parametrize(("line", "change", "said"), [
+    ("register('plants', 'odd')(3)", "plant.kind=odd", "plant of kind 'odd': TypeError: 3 is not a "
+     "callable object"),
+    ("register('robots', 'odd')(lambda: 1 / 0)", "robot.model=odd", "robot 'odd' of a plugin: "
+     "ZeroDivisionError: division by zero"),
+    ("register('resolvers', 'odd')(lambda: make('hcod'))", "control.resolver=odd", "resolver 'odd' "
+     "of a plugin: expected a class of Resolver, got function"),
+    ("register('resolvers', 'odd')(type('Odd', (Halved,), {'__post_init__': lambda self: 1 / 0}))",
+     "control.resolver=odd", "resolver 'odd': ZeroDivisionError: division by zero"),
+    ("register('resolvers', 'odd')(type('Odd', (Halved,), {'accuracy': float('nan')}))",
+     "control.resolver=odd", "resolver Odd: accuracy = nan"),  # lost the run when it was saved
+    ("Halved.solve = type('Odd', (Resolver,), {'name': 'odd', 'solve': lambda self, h, memory: "
+     "Resolution(h.start(), 'SOLVED')}).solve", "control.resolver=halved", "resolver 'halved': "
+     "status: expected a Status, got str 'SOLVED'"),
+    ("register('tasks', 'odd')(type('Odd', (JointCoupling,), {'dimension': 1.5}))",
+     "tasks.0={kind='odd', joints={joint_1=1.0}, value=0.1}", "task 'odd': dimension = 1.5: "
+     "expected a whole number"),
+    ("register('sensors', 'odd')(lambda exact: exact.measurement)", "sensor.kind=odd",
+     "sensor of kind 'odd': Measurement <")])
+def test_what_is_registered_and_no_such_thing_is_named(line, change, said, folder):
+    (folder / "doors_of_mine.py").write_text(f"{MODULE}{line}\n")
+    plugins.allow("doors_of_mine")
+    avoiding = ["avoidance={kind = 'separation', obstacles = [{centre = [0.6, 0.6, 0.6]}]}"]
+    refused(said, lambda: simulate(load("own.toml", [change, *avoiding * ("sensor" in change)])))
+
+
+@pytest.mark.parametrize(("line", "said"), [
+    ("register('resolvers', 'tpm')(Halved)", "resolvers: 'tpm' is already"),  # was ignored
+    ("register('robots', 'kuka_lwr')(my_arm)", "robots: 'kuka_lwr' is already DHTable"),  # this too
+    ("from solvers.resolver import register as add; Halved.name = 'hcod'; add(Halved)",
+     "resolvers: 'hcod' is already"),  # took the place of hcod
+    ("register('tasks', 'odd')(None)", "tasks: 'odd' is None"),
+    ("register('tasks', Weak)", "tasks: name: expected a str, got type"),
+    ("from scenarios.recording.signals import Signal; Signal('odd', 'Pa', (3,), '')",
+     "signal 'odd': shape: expected a str, got tuple (3,)")])
+def test_what_cannot_be_registered_is_refused_on_import(line, said, folder):
+    (folder / "doors_of_mine.py").write_text(f"{MODULE}{line}\n")
+    refused(f"plugin 'doors_of_mine' cannot be imported: {said}", plugins.allow, "doors_of_mine")
+    assert type(make("hcod")).__name__ == "Hcod"
+    refused("'./mine.py': give the name of a module", plugins.allow, "./mine.py")
+
+
+def test_a_figure_that_fails_is_left_out_of_the_page(command, folder, undrawn):
+    figures = ("from scenarios.draw.figures.panels import Panel\nregister('figures', 'odd')(Panel("
+               "'odd', 'Odd', 'rad', 'q', lambda ax, run, colour: exit(3)))\n")
+    robot = "register('robots', 'same')(Robot.named('kuka_lwr'))\n"
+    (folder / "doors_of_mine.py").write_text(f"{MODULE}{figures}{robot}")
+    with pytest.warns(UserWarning, match="figure 'odd' is left out: SystemExit: 3"):
+        command("compare own.toml --plugin doors_of_mine --resolvers hcod,tpm --out a --workers 1 "
+                "--set robot.model=same")
+    assert "Side by side" in (folder / "a" / "index.html").read_text()
+
+
 def test_two_things_of_one_name_are_refused():
     plugins.register("tasks", "thing")(type("One", (), {}))
     refused("tasks: 'thing' is already", plugins.register("tasks", "thing"), type("Two", (), {}))
     refused("unknown group 'task'; did you mean 'tasks'", plugins.register, "task", "thing")
     plugins.register("resolvers", "whole")(int)
-    refused("unknown resolver 'whole'", make, "whole")
+    refused("resolver 'whole' of a plugin: expected a class of Resolver", make, "whole")

@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING, Any, ClassVar, Self, get_args, get_origin, get
 from pydantic import ConfigDict, Field, create_model
 
 from hierarchy import plugins
-from hierarchy.errors import HierarchyError
+from hierarchy.errors import of_user
 from hierarchy.paths import Path
 from hierarchy.plugins import Group
 from scenarios.config.sections import Finite, Flag, ScenarioError, Section, Whole, naming
@@ -97,12 +97,8 @@ class OwnSection(PartSection):
         keys = {name.removeprefix(_KEY): value for name, value in self
                 if name.startswith(_KEY) and value is not None}
         provided = {name: value for name, value in given.items() if name in GIVEN[self.group]}
-        try:
+        with of_user(f"{self.group[:-1]} of kind {self.kind!r}", ScenarioError):
             return _called(type(self).maker, {"robot": robot, **keys, **provided})
-        except Exception as error:
-            kind = "" if isinstance(error, HierarchyError) else f"{type(error).__name__}: "
-            raise ScenarioError(f"{self.group[:-1]} of kind {self.kind!r}: {kind}{error}"
-                                ) from error
 
 
 def _again(own: type[OwnSection], kind: str, data: dict[str, Any]) -> OwnSection:
