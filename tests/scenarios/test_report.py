@@ -202,13 +202,16 @@ def test_a_joint_has_one_colour_in_a_figure_of_two_runs():
     assert len(first) == 8
 
 
-def test_a_joint_whose_name_begins_with_an_underscore_is_in_the_legend():
-    """matplotlib leaves such labels out of its own."""
+@pytest.mark.parametrize("name", ["_{}", r"$\frac{{${}"])
+def test_a_joint_with_a_name_that_matplotlib_reads_otherwise_is_in_the_legend(name, tmp_path):
+    """It leaves labels that begin with an underscore out of its own, and sets equations."""
     run = recording()
-    robot = dataclasses.replace(run.facts.robot, velocity_names=tuple(f"_{i}" for i in range(7)))
+    robot = dataclasses.replace(run.facts.robot, velocity_names=tuple(
+        name.format(i) for i in range(7)))
     run = dataclasses.replace(run, facts=dataclasses.replace(run.facts, robot=robot))
     fig = letter.stacked([(run, [letter.PANEL["joint-velocities"]])], "")
     assert [text.get_text() for text in fig.legends[0].texts] == [*robot.velocity_names]
+    drawing.write(fig, str(tmp_path / "speeds"))
 
 
 def test_a_picture_links_the_body_with_the_surface_and_shows_where_listed_tasks_are_to_go(

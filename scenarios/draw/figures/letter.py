@@ -198,9 +198,11 @@ def stacked(parts: Sequence[tuple[Recording, Sequence[Panel]]], title: str,
         *((line, str(line.get_label())) for line in ax.lines if line.get_label() in joints))}
     if lines:
         wide = drawing.present().titled and max(map(len, lines)) <= _SHORT
-        fig.legend(list(lines.values()), list(lines), fontsize="small", frameon=False,
-                   ncols=7 if wide else 4, handlelength=1.8,
-                   columnspacing=1.0, loc="outside lower center")
+        legend = fig.legend(list(lines.values()), list(lines), fontsize="small", frameon=False,
+                            ncols=7 if wide else 4, handlelength=1.8,
+                            columnspacing=1.0, loc="outside lower center")
+        for text in legend.get_texts():
+            text.set_parse_math(False)  # $ in the name of a joint begins no equation
     axes[-1].set_xlabel("time [s]")
     if drawing.present().titled:
         said = f"{title}: {next(iter(runs.values()))}" if len(runs) == 1 else title
