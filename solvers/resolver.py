@@ -196,7 +196,7 @@ def _judged(solve: Solve) -> Solve:
     """Return the `solve` of a plugin, whose result is looked at: it is the user's code."""
     @functools.wraps(solve)
     def judged(self: Any, h: Hierarchy, memory: Array | None = None) -> Resolution:
-        found: Any = solve(self, h, memory)
+        found: Resolution = solve(self, h, memory)
         expect(f"resolver {self.name!r}: solve", found, Resolution, "return solvers.Resolution(x)")
         expect(f"resolver {self.name!r}: status", found.status, Status, "give one of Status")
         whole(f"resolver {self.name!r}: iterations", found.iterations)
@@ -204,8 +204,10 @@ def _judged(solve: Solve) -> Solve:
         if type(x) is not _ARRAY or x.dtype != _FLOAT or x.shape != (h.n,):
             raise HierarchyError(f"resolver {self.name!r}: solve: x: expected an array of {h.n} "
                                  f"floats, got {brief(x)}")
-        return found if np.isfinite(x).all() else Resolution(np.zeros(h.n),
-                                                             Status.NUMERICAL_FAILURE)
+        if not np.isfinite(x).all():
+            return Resolution(np.zeros(h.n), Status.NUMERICAL_FAILURE)
+        found.x = x.copy()  # which it may keep, and overwrite with the next answer
+        return found
 
     return judged
 

@@ -101,9 +101,10 @@ def tick(controller: Controller, recorder: Recorder, t: float,
     plant = controller.cell.plant
     try:
         if faults is None:
-            plant.act(controller.command(t, plant.q, plant.v))
+            command = controller.command(t, plant.q, plant.v)
         else:
-            plant.act(controller.command(t, *faults.measure(t)))
+            command = controller.command(t, *faults.measure(t))
+        plant.act(command.copy())  # what was sent is recorded, and perhaps held
         sound = recorder.write()
         recorder.stamp(controller.clock())
         recorder.look()

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from refusals import refused
 
-from hierarchy import Robot, plugins
+from hierarchy import Hierarchy, Robot, plugins
 from scenarios import Scenario, load, load_run, simulate
 from scenarios.config.sections.tasks import OwnTask
 from scenarios.measure.goals import goals
@@ -105,6 +105,18 @@ class Odd(KinematicArm):
 @register("plants", "none")
 def none():
     return None
+'''
+
+KEPT = '''
+X = np.zeros(7)
+
+@register("resolvers", "kept")
+class Kept(Resolver):
+    name, handles = "kept", "inequalities"
+
+    def solve(self, h, memory=None):
+        X[:] = make("hcod").solve(h).x
+        return Resolution(X)
 '''
 
 
@@ -224,6 +236,19 @@ def test_a_plant_that_fails_is_named_and_what_was_run_is_kept(fault, said, comma
     assert text.startswith(f"hierarchy: fault: {said}")
     assert "from tick 10 on" in text
     assert load_run("a").ticks in (10, 11)
+
+
+def test_arrays_that_a_plugin_keeps_and_overwrites_are_its_own(command, folder):
+    with_plant(folder, '"odd", then = "command[:] = 99.0"')
+    with (folder / "doors_of_mine.py").open("a") as module:
+        module.write(KEPT)
+    command("run own.toml --plugin doors_of_mine --resolver kept --out a")
+    command("run own.toml --plugin doors_of_mine --resolver hcod --set plant.then=pass --out b")
+    np.testing.assert_array_equal(load_run("a")["command"], load_run("b")["command"])
+    h = Hierarchy.from_levels([(np.eye(7), np.arange(7.0))])
+    first = make("kept").solve(h)
+    make("kept").solve(h.changed(lower=-h.lower, upper=-h.upper))
+    assert first.x[6] == pytest.approx(6.0)
 
 
 @pytest.mark.parametrize(("body", "said"), [
