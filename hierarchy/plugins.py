@@ -26,7 +26,6 @@ from typing import TYPE_CHECKING, Any, Literal, TypeVar, get_args
 
 from hierarchy.errors import (
     HierarchyError,
-    brief,
     check_name,
     expect,
     naming,
@@ -63,7 +62,7 @@ def register(group: Group, name: str, *, shipped: bool = False) -> Callable[[_Th
         before = _shipped[group].get(name, _registered[group].get(name, thing))
         refuse(thing is None, f"{group}: {name!r} is None")
         refuse(_origin(before) != _origin(thing),  # a module may be imported again
-               f"{group}: {name!r} is already {brief(before)}")
+               f"{group}: {name!r} is already {_origin(before)[:80]}")
         (_shipped if shipped else _registered)[group][name] = thing
         return thing
 

@@ -152,6 +152,23 @@ def test_the_kinds_of_a_plugin_are_explained_and_a_wrong_key_meets_only_its_own(
     assert "unknown key 'tasks.0.joynt'; did you mean 'tasks.0.joint'? Known: angle," in said
 
 
+@pytest.mark.parametrize(("annotation", "value", "made"), [
+    ("Frame | None", '"joint_4"', "Frame(name='joint_4'"),
+    ("list[Frame]", '["joint_1"]', "[Frame(name='joint_1'"),  # was a list of texts
+    ("Path | None", "{kind = 'still', position = [1.0, 2.0, 3.0]}", "Still("),
+    ("float | None", '"5"', "tasks.1.x: Input should be a valid number, got '5'"),  # was 5.0
+    ("dict[str, float]", "{a = true}", "tasks.1.x.a: Input should be a valid number, got True")])
+def test_keys_that_may_be_left_out_or_are_lists_are_read_as_others(annotation, value, made, folder):
+    (folder / "doors_of_mine.py").write_text(MODULE + f"""
+@register("tasks", "shown")
+def shown(x: {annotation} = None):
+    raise ValueError(repr(x))
+""")
+    plugins.allow("doors_of_mine")
+    refused(made, lambda: simulate(load("own.toml", [
+        f"tasks.1={{kind = 'shown', x = {value}}}"])))
+
+
 def test_the_error_of_a_task_of_a_plugin_has_the_unit_that_its_class_says(folder):
     file, scenario = folder / "doors_of_mine.py", folder / "own.toml"
     file.write_text(MODULE + BRITTLE.replace("dimension = 1", 'dimension = 1\n    unit = "kg"\n'
@@ -357,9 +374,9 @@ def test_what_is_registered_and_no_such_thing_is_named(line, change, said, folde
 
 @pytest.mark.parametrize(("line", "said"), [
     ("register('resolvers', 'tpm')(Halved)", "resolvers: 'tpm' is already"),  # was ignored
-    ("register('robots', 'kuka_lwr')(my_arm)", "robots: 'kuka_lwr' is already DHTable"),  # this too
+    ("register('robots', 'kuka_lwr')(my_arm)", "robots: 'kuka_lwr' is already"),  # this too
     ("from solvers.resolver import register as add; Halved.name = 'hcod'; add(Halved)",
-     "resolvers: 'hcod' is already"),  # took the place of hcod
+     "resolvers: 'hcod' is already solvers.resolvers.hcod.Hcod"),  # took the place of hcod
     ("register('tasks', 'odd')(None)", "tasks: 'odd' is None"),
     ("register('tasks', Weak)", "tasks: name: expected a str, got type"),
     ("from scenarios.recording.signals import Signal; Signal('odd', 'Pa', (3,), '')",
