@@ -32,6 +32,16 @@ def naming(what: str, error: type[HierarchyError] = HierarchyError,
         raise error(f"{what}: {found}") from found
 
 
+@contextmanager
+def of_user(what: str, error: type[HierarchyError] = HierarchyError) -> Iterator[None]:
+    """Make whatever a user's code raises within an `error` that says `what` it is of."""
+    try:
+        yield
+    except (Exception, SystemExit) as found:
+        kind = "" if isinstance(found, HierarchyError) else f"{type(found).__name__}: "
+        raise error(f"{what}: {kind}{found}") from found
+
+
 class UnknownNameError(HierarchyError):
     """An unknown name, with the most similar known ones; `more` is a further sentence.
 
@@ -87,6 +97,11 @@ def expect(what: str, value: object, kind: type, remedy: str) -> None:
         article = "an" if kind.__name__[0] in "AEIOUaeiou" else "a"
         raise HierarchyError(f"{what}: expected {article} {kind.__name__}, got {brief(value)}; "
                              f"{remedy}")
+
+
+def text(what: str, value: object) -> None:
+    """Raise a HierarchyError unless a value is a text, or return None."""
+    expect(what, value, str, "give a text")
 
 
 def expect_each(what: str, values: object, kind: type, remedy: str) -> None:

@@ -24,7 +24,15 @@ from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal, TypeVar, get_args
 
-from hierarchy.errors import HierarchyError, check_name, expect, naming
+from hierarchy.errors import (
+    HierarchyError,
+    check_name,
+    expect,
+    naming,
+    of_user,
+    refuse,
+    text,
+)
 
 if TYPE_CHECKING:
     from importlib.metadata import EntryPoint
@@ -45,14 +53,16 @@ def register(group: Group, name: str, *, shipped: bool = False) -> Callable[[_Th
     """Return a decorator that makes a thing available under a name.
 
     `shipped` is for what this package brings. Raises UnknownNameError for an unknown group,
-    HierarchyError if the name is taken.
+    HierarchyError if the name is no text or taken, or the thing is None.
     """
     check_name("group", group, GROUPS)
+    text(f"{group}: name", name)
 
     def keep(thing: _Thing) -> _Thing:
         before = _shipped[group].get(name, _registered[group].get(name, thing))
-        if _origin(before) != _origin(thing):  # a module may be imported again
-            raise HierarchyError(f"{group}: {name!r} is already {_origin(before)}")
+        refuse(thing is None, f"{group}: {name!r} is None")
+        refuse(_origin(before) != _origin(thing),  # a module may be imported again
+               f"{group}: {name!r} is already {_origin(before)[:80]}")
         (_shipped if shipped else _registered)[group][name] = thing
         return thing
 
@@ -93,6 +103,8 @@ def allow(module: str) -> None:
 
     Raises HierarchyError with the cause if it cannot be imported.
     """
+    refuse(module.endswith(".py") or not all(map(str.isidentifier, module.split("."))),
+           f"plugin {module!r}: give the name of a module, such as my_module for my_module.py")
     path = list(sys.path)
     sys.path.append(str(Path.cwd()))  # at the end, where it hides no installed module
     try:
@@ -161,11 +173,8 @@ def _points(group: Group) -> tuple[EntryPoint, ...]:
 
 
 def _import(module: str, what: str) -> None:
-    try:
+    with of_user(f"{what} cannot be imported"):
         import_module(module)
-    except (Exception, SystemExit) as error:  # a user's code, which may fail in any way
-        raise HierarchyError(f"{what} cannot be imported: {type(error).__name__}: "
-                             f"{error}") from error
 
 
 def _origin(thing: Any) -> str:

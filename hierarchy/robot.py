@@ -26,6 +26,7 @@ from hierarchy.errors import (
     finite_numbers,
     is_one_of,
     naming,
+    of_user,
     refuse,
     whole,
 )
@@ -182,7 +183,7 @@ class Robot:
     def named(cls, name: str, base: Base | None = None) -> Robot:
         """Build a robot of `hierarchy.robot.ROBOTS` or of a plugin; UnknownNameError for another.
 
-        A plugin registers a table, a file, or a function that returns one of these or a Robot.
+        A plugin registers a table, a file, a Robot, or a function that returns one of these.
         `base` "fixed" or "floating" overrides that of its table.
         """
         expect("Robot.named: name", name, str, "give a name of ROBOTS")
@@ -191,7 +192,8 @@ class Robot:
         if found is None:
             known = {*TABLES, *plugins.own("robots")}
             raise UnknownNameError("robot", name, known, elsewhere(name))
-        made = found if isinstance(found, Table | str | Path) else found()
+        with of_user(f"robot {name!r} of a plugin"):
+            made = found if isinstance(found, Table | str | Path | cls) else found()
         if isinstance(made, str | Path):
             made = cls.from_file(made, base=base)
         elif isinstance(made, Table):

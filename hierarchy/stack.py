@@ -17,6 +17,7 @@ from hierarchy.errors import (
     is_one_of,
     naming,
     refuse,
+    whole,
 )
 from hierarchy.gate import Sizes, checked_give, checked_metric
 from hierarchy.jit import bind, compiled
@@ -249,7 +250,7 @@ class Stack:
 
     def _buffers(self, order: tuple[str, ...], joints: int) -> Hierarchy:
         n = joints if self.contacts is None else self.contacts.unknowns
-        sizes = [self[name].dimension for name in order]
+        sizes = [whole(f"task {name!r}: dimension", self[name].dimension) for name in order]
         m = sum(sizes)
         give = np.concatenate([np.empty(0), *(map(self._room, order) if self._give else ())])
         return Hierarchy.trusted(np.zeros((m, n)), np.zeros(m), np.zeros(m), sizes, names=order,

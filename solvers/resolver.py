@@ -7,6 +7,7 @@ import functools
 import math
 from abc import ABC, abstractmethod
 from collections.abc import Callable
+from contextlib import nullcontext
 from functools import cached_property
 from typing import Any, ClassVar, Literal, TypeVar, get_args
 
@@ -20,6 +21,8 @@ from hierarchy.errors import (
     brief,
     check_name,
     expect,
+    of_user,
+    positive,
     whole,
 )
 from hierarchy.jit import announce_compilation
@@ -193,14 +196,18 @@ def _judged(solve: Solve) -> Solve:
     """Return the `solve` of a plugin, whose result is looked at: it is the user's code."""
     @functools.wraps(solve)
     def judged(self: Any, h: Hierarchy, memory: Array | None = None) -> Resolution:
-        found: Any = solve(self, h, memory)
+        found: Resolution = solve(self, h, memory)
         expect(f"resolver {self.name!r}: solve", found, Resolution, "return solvers.Resolution(x)")
+        expect(f"resolver {self.name!r}: status", found.status, Status, "give one of Status")
+        whole(f"resolver {self.name!r}: iterations", found.iterations)
         x = found.x
         if type(x) is not _ARRAY or x.dtype != _FLOAT or x.shape != (h.n,):
             raise HierarchyError(f"resolver {self.name!r}: solve: x: expected an array of {h.n} "
                                  f"floats, got {brief(x)}")
-        return found if np.isfinite(x).all() else Resolution(np.zeros(h.n),
-                                                             Status.NUMERICAL_FAILURE)
+        if not np.isfinite(x).all():
+            return Resolution(np.zeros(h.n), Status.NUMERICAL_FAILURE)
+        found.x = x.copy()  # which it may keep, and overwrite with the next answer
+        return found
 
     return judged
 
@@ -301,9 +308,20 @@ _Kind = TypeVar("_Kind", bound=Resolver)
 
 
 def register(kind: type[_Kind]) -> type[_Kind]:
-    """Register a class of resolvers under its name."""
+    """Register a class of resolvers under its name; HierarchyError if that is taken."""
+    _check(kind)
+    plugins.register("resolvers", kind.name, shipped=kind.__module__.startswith("solvers."))(kind)
     _REGISTRY[kind.name] = kind
     return kind
+
+
+def _check(kind: type[Resolver]) -> None:
+    """Raise a HierarchyError for what a class of resolvers says of itself and is not so."""
+    what = f"resolver {kind.__name__}"
+    expect(f"{what}: name", getattr(kind, "name", None), str, "give it a name")
+    check_name(f"kind of rows that {kind.name} handles", kind.handles, _KINDS)
+    positive(f"{what}: accuracy", kind.accuracy)
+    expect(f"{what}: strict", kind.strict, bool, "say whether priorities are")
 
 
 def register_variant(name: str, resolver: str, **settings: Any) -> None:
@@ -326,9 +344,13 @@ def _find_elsewhere(name: str) -> None:
     """Register the resolver that a plugin has under a name; UnknownNameError if there is none."""
     found = plugins.find("resolvers", name)
     if name not in _REGISTRY:  # a plugin may have used `register` of this module
-        if not (isinstance(found, type) and issubclass(found, Resolver)):
+        if found is None:
             known = {*_REGISTRY, *_VARIANTS, *plugins.own("resolvers")}
             raise UnknownNameError("resolver", name, known)
+        if not (isinstance(found, type) and issubclass(found, Resolver)):
+            raise HierarchyError(f"resolver {name!r} of a plugin: expected a class of Resolver, "
+                                 f"got {brief(found)}")
+        _check(found)
         _REGISTRY[name] = found
 
 
@@ -348,4 +370,5 @@ def make(name: str, /, **settings: Any) -> Resolver:
     known = [field.name for field in dataclasses.fields(kind)]
     for setting in settings:
         check_name(f"setting of {name}", setting, known)
-    return kind(**settings)
+    with nullcontext() if kind.__module__.startswith("solvers.") else of_user(f"resolver {name!r}"):
+        return kind(**settings)

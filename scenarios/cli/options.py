@@ -41,10 +41,15 @@ def complete_resolvers(incomplete: str) -> list[str]:
 
 
 def _given(path: str | Path) -> Path:
-    """Return a path or a default; an unset variable of a shell would leave it empty."""
-    if not str(path).strip():
+    """Return a path or a default, ~ as the home folder, which a shell leaves behind `--out=`."""
+    from hierarchy.errors import HierarchyError, file_path
+
+    if not str(path).strip():  # as an unset variable of a shell leaves it
         raise typer.BadParameter("the path is empty")
-    return Path(path)
+    try:
+        return file_path("path", path)
+    except HierarchyError as error:
+        raise typer.BadParameter(str(error)) from error
 
 
 def output(help: str, metavar: str = "FOLDER") -> Any:
@@ -101,9 +106,10 @@ Port = Annotated[int, typer.Option("--port", metavar="N", min=0, max=65535,
                                    help="Port of the page on 127.0.0.1; 0 for any free port.")]
 Browser = Annotated[bool, typer.Option("--browser/--no-browser",
                                        help="Open a browser, or only print the address.")]
-Run = Annotated[Path, typer.Argument(metavar="RUN", help="Run folder of `hierarchy run`.")]
+Run = Annotated[Path, typer.Argument(metavar="RUN", parser=_given,
+                                     help="Run folder of `hierarchy run`.")]
 Runs = Annotated[list[Path], typer.Argument(
-    metavar="RUN...", help="Folders of `hierarchy run` or `compare`.")]
+    metavar="RUN...", parser=_given, help="Folders of `hierarchy run` or `compare`.")]
 
 
 def listed_in(specs: str) -> list[str]:

@@ -166,6 +166,8 @@ def why(folder: Run,
     if as_json:
         return print_json({"jumps": [{**vars(one), "causes": [cause._asdict() for cause in
                                                               one.causes]} for one in found]})
+    if not found:
+        print("The command did not change from any tick to the next.")
     for one in found:
         print(f"tick {one.tick} (t = {one.t:.3f} s): {one}")
         for kind, text in one.causes or (("other", "no single cause"),):

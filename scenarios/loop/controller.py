@@ -148,9 +148,9 @@ class Controller:
         if self._measure_cone is not None:
             self.cone_error = self._measure_cone()
         if cell.sensor is not None:
-            seen = cell.sensor.measure(cell.state)
+            cell.sensor.measure(cell.state)
             self._outside = cell.sensor.outside
-            if seen.blind and "stale" not in troubles:
+            if cell.sensor.measurement.blind and "stale" not in troubles:
                 troubles.append("stale")
             nearest = self._nearest()
             if not nearest > 0.0:

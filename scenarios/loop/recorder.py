@@ -7,7 +7,9 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from hierarchy import plugins
 from hierarchy.allocation import AVOIDANCE
+from hierarchy.errors import HierarchyError, UnknownNameError, naming, refuse
 from hierarchy.jit import bind, compiled
 from hierarchy.kinematics import place
 from hierarchy.problem import Array
@@ -17,6 +19,7 @@ from scenarios.loop.controller import Controller
 from scenarios.recording import listed
 from scenarios.recording.facts import facts_of, placed_points
 from scenarios.recording.recording import Event, Recording
+from scenarios.recording.signals import check_shapes, known
 
 FASTEST = 1e3  # [rad/s or m/s] of a joint; a faster motion has diverged
 _CHOICES = ("order", "active_control_point", "repulsion_active", "status", "iterations")
@@ -26,14 +29,15 @@ _TIMES = ("time_kinematics", "time_rows", "time_resolve", "time_tick")
 class _Log(NamedTuple):
     """What is written in each tick; names are those of signals.
 
-    given : a, then the command. choices, times : see _CHOICES, _TIMES; the last of the times is
-    first the clock at the start of the tick.
+    choices, times : see _CHOICES, _TIMES; the last of the times is first the clock at the start of
+    the tick.
     """
 
     t: Array
     q: Array
     v: Array
-    given: Array
+    a: Array
+    command: Array
     ee_position: Array
     pointing_error: Array
     distance: Array
@@ -69,13 +73,19 @@ class Recorder:
             """Return rows of NaN: the system maps memory when it is first touched."""
             return np.full((count, *shape), np.nan)
 
-        self._log = _Log(rows(), rows(robot.nq), rows(robot.n),
-                         rows(robot.n + len(controller.sent)), rows(3), rows(), rows(points),
+        self._log = _Log(rows(), rows(robot.nq), rows(robot.n), rows(robot.n),
+                         rows(len(controller.sent)), rows(3), rows(), rows(points),
                          np.full((ticks, len(_CHOICES)), -1, dtype=np.int16), rows(len(_TIMES)))
         self._desired = rows(3, 3, count=ticks if cell.tasks.position else 0)
         self._answers = rows(len(controller.resolution.x), count=ticks if cell.contacts else 0)
-        self._extra = {name: np.empty((ticks, *value.shape), value.dtype)
-                       for name, value in cell.plant.extra.items()}
+        self._plant = f"plant of kind {cell.scenario.plant.kind!r}"
+        with naming(f"{self._plant}: extra"):
+            self._extra = {name: np.empty((ticks, *np.shape(value)), np.asarray(value).dtype)
+                           for name, value in cell.plant.extra.items()}
+            for name in self._extra:
+                if known(name) is None:
+                    raise UnknownNameError("signal", name, plugins.known("signals"))
+            check_shapes(self._extra, T=ticks, nq=robot.nq, n=robot.n)
         self._weights = np.empty(ticks if controller.blend else 0)
         self._events: list[Event] = []
         self._always: tuple[Audit, ...] = (Truth(cell),)
@@ -83,6 +93,11 @@ class Recorder:
         self._audited: dict[str, NDArray[Any]] = {}
         self.facts = facts_of(cell.scenario, robot, cell.contacts)
         self.follow(controller)
+        if self._extra:
+            none = slice(0)
+            own = self._of_controller(_Log._make([rows[none] for rows in self._log]), none)
+            for name in self._extra:
+                refuse(name in own, f"{self._plant}: extra: {name!r}, which the loop records")
 
     def follow(self, controller: Controller) -> None:
         """Continue with this controller, which has the same robot, plant and measured points."""
@@ -106,13 +121,16 @@ class Recorder:
         index = self._orders.setdefault(order, len(self._orders))
         active = cell.sensor.measurement.active + 1 if AVOIDANCE in order and cell.sensor else -1
         resolution, plant = controller.resolution, cell.plant
-        finite = _write_given(self._log.given, k, plant.a, controller.sent)
-        finite &= self._write_rest(
+        self._log.command[k] = controller.sent
+        try:
+            self._log.a[k] = plant.a
+            for name, values in self._extra.items():
+                values[k] = plant.extra[name]
+        except (AttributeError, KeyError, TypeError, ValueError) as error:  # a user's code
+            raise HierarchyError(f"{self._plant}: a or extra has changed: {error}") from error
+        finite = self._write_rest(
             k, (index, active, repulsion, resolution.status, resolution.iterations),
             (cell.state.t, controller.cone_error, *controller.stamps))
-        if self._extra:
-            for name, value in plant.extra.items():
-                self._extra[name][k] = value
         if cell.contacts is not None and controller.answered:
             self._answers[k] = resolution.x
         if self._blend is not None:
@@ -179,8 +197,8 @@ class Recorder:
         """Return the signals of what the controller knew and did."""
         cell, n = self._cell, self._cell.robot.n
         order, active, repulsion, status, iterations = log.choices.T.copy()
-        signals = {"t": log.t, "q": log.q, "v": log.v, "a": log.given[:, :n].copy(),
-                   "command": log.given[:, n:].copy(), "ee_position": log.ee_position,
+        signals = {"t": log.t, "q": log.q, "v": log.v, "a": log.a,
+                   "command": log.command, "ee_position": log.ee_position,
                    "order": order, "status": status, "iterations": iterations,
                    **dict(zip(_TIMES, log.times.T.copy(), strict=True))}
         if cell.tasks.position is not None:
@@ -207,20 +225,8 @@ class Recorder:
 
 
 @compiled
-def _write_given(given, k, a, command):
-    """Write acceleration and command of tick k; return whether the acceleration is finite."""
-    row, n, finite = given[k], len(a), True
-    for j in range(n):
-        row[j] = a[j]
-        finite &= np.isfinite(a[j])
-    for j in range(len(command)):
-        row[n + j] = command[j]
-    return finite
-
-
-@compiled
 def _write(log, seen, joint, offset, k, chosen, measured):
-    """Write the rest of tick k; return whether q is finite and v within FASTEST.
+    """Write the rest of tick k; return whether q and a are finite and v within FASTEST.
 
     chosen: see _CHOICES. measured: t, the error of the cone, and the clock at the start of the tick
     and after kinematics, rows and resolution.
@@ -232,7 +238,7 @@ def _write(log, seen, joint, offset, k, chosen, measured):
         finite &= np.isfinite(seen.q[j])
     for j in range(len(seen.v)):
         log.v[k, j] = seen.v[j]
-        finite &= abs(seen.v[j]) <= FASTEST
+        finite &= abs(seen.v[j]) <= FASTEST and np.isfinite(log.a[k, j])
     at = place(seen.placements[joint], offset)
     log.ee_position[k, 0], log.ee_position[k, 1], log.ee_position[k, 2] = at
     for j in range(len(seen.distance)):

@@ -108,18 +108,20 @@ def tick(controller: Controller, recorder: Recorder, t: float,
     plant = controller.cell.plant
     try:
         if faults is None:
-            plant.act(controller.command(t, plant.q, plant.v))
+            command = controller.command(t, plant.q, plant.v)
         else:
-            plant.act(controller.command(t, *faults.measure(t)))
+            command = controller.command(t, *faults.measure(t))
+        plant.act(command.copy())  # what was sent is recorded, and perhaps held
         sound = recorder.write()
         recorder.stamp(controller.clock())
         recorder.look()
+        fault: str | None = getattr(plant, "fault", None) or None
     except (Exception, SystemExit) as error:  # a user's code, which may fail in any way
         return blamed(error)
     if not sound or (controller.policy.events and not (
             np.isfinite(plant.q).all() and np.isfinite(plant.v).all())):
         return _unsound(controller)
-    return getattr(plant, "fault", None)
+    return fault
 
 
 def _unsound(controller: Controller) -> str:

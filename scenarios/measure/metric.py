@@ -2,13 +2,12 @@
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
-from functools import partial
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from hierarchy import plugins
-from hierarchy.errors import expect, number
+from hierarchy.errors import number, text
 from hierarchy.problem import Array
 from hierarchy.records import check_fields
 from scenarios.recording.recording import Recording
@@ -23,7 +22,6 @@ _SHOWN = {"m": (1e3, "mm", 3), "s": (1.0, "s", 3), "deg": (1.0, "°", 3), "share
 
 _COMPUTING = 1e6, "µs", 2  # display unit of a time of the group "Computing"
 NOTHING = 1e-9  # SI units: what differs by less differs by rounding
-_text = partial(expect, kind=str, remedy="give a text")
 
 
 @dataclass(frozen=True)
@@ -45,7 +43,7 @@ class Metric:
     detail: bool = False
 
     def __post_init__(self) -> None:
-        check_fields(self, f"metric {self.name!r}", {float: number, str: _text})
+        check_fields(self, f"metric {self.name!r}", {float: number, str: text})
 
     @property
     def _display(self) -> tuple[float, str, int]:

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from hierarchy import plugins
-from hierarchy.errors import expect_each
+from hierarchy.errors import expect_each, refuse
 from hierarchy.problem import Array
 from scenarios.measure import safety
 from scenarios.measure.metric import NOTHING, Criteria, finite, known, largest, register, true
@@ -192,28 +192,22 @@ def measure(recording: Recording, settle: float = 2.0,
 
     Distances, joint speeds, limits, cone and listed tasks are judged by the true state where it is
     known apart from the measured one. A plugin adds metrics with `register("metrics", NAME)` on a
-    function of a recording and Criteria that yields them; if it fails, a warning says so.
+    function of a recording and Criteria that yields them; if one fails, a warning says so.
     """
     if recording.ticks == 0:
         return {}
-    by = Criteria(settle, cone_tolerance_deg)
-    found = [metric for name in plugins.known("metrics") for metric in _found(name, recording, by)]
+    by, found = Criteria(settle, cone_tolerance_deg), dict[str, Metric]()
+    for name, measures in plugins.known("metrics").items():
+        try:
+            metrics = list(measures(recording, by))
+            expect_each("what it yields", metrics, Metric, "yield these")
+            for metric in metrics:
+                refuse(metric.name in found, f"others yield {metric.name!r} too")
+            found |= {metric.name: metric for metric in metrics}
+        except (Exception, SystemExit) as error:  # a user's code, which must not cost the run
+            warnings.warn(f"metrics {name!r} are left out: {blamed(error)}", stacklevel=2)
     groups = {group: place for place, group in enumerate(_GROUPS)}
-    found.sort(key=lambda metric: groups.get(metric.group, len(groups)))
-    return {metric.name: metric for metric in found}
-
-
-def _found(name: str, recording: Recording, by: Criteria) -> list[Metric]:
-    """Return the metrics of a registered function; a plug-in's failure must not cost the run."""
-    try:
-        found = list(plugins.known("metrics")[name](recording, by))
-        expect_each(f"metrics {name!r}", found, Metric, "yield these")
-    except Exception as error:
-        if name not in plugins.own("metrics"):
-            raise
-        warnings.warn(f"metrics {name!r} are left out: {blamed(error)}", stacklevel=2)
-        return []
-    return found
+    return dict(sorted(found.items(), key=lambda item: groups.get(item[1].group, len(groups))))
 
 
 def as_plain_data(recording: Recording) -> dict[str, Any]:

@@ -13,7 +13,8 @@ from typing import Any
 from numpy.typing import NDArray
 
 from hierarchy import plugins
-from hierarchy.errors import refuse
+from hierarchy.errors import expect, refuse, text
+from hierarchy.records import check_fields
 
 OTHER = "/other"  # the topic of what has no other
 
@@ -34,6 +35,9 @@ class Signal:
     text: str
     topic: str = OTHER
 
+    def __post_init__(self) -> None:
+        check_fields(self, f"signal {self.name!r}", {str: text})
+
     @property
     def constant(self) -> bool:
         """Whether it has one value for the whole run."""
@@ -41,10 +45,13 @@ class Signal:
 
 
 def known(name: str) -> Signal | None:
-    """Return the signal of a name, None if there is none."""
-    return plugins.find("signals", name) or next(
-        (signal for signal in plugins.known("signals").values()
-         if signal.name[-1] == "*" and name.startswith(signal.name[:-1])), None)
+    """Return the signal of a name, None if there is none; HierarchyError for what is no Signal."""
+    found = plugins.find("signals", name) or next(
+        (signal for key, signal in plugins.known("signals").items()
+         if key[-1:] == "*" and name.startswith(key[:-1])), None)
+    if found is not None:
+        expect(f"signals: {name!r}", found, Signal, "register a Signal")
+    return found
 
 
 def check_shapes(signals: Mapping[str, NDArray[Any]], **sizes: int) -> None:

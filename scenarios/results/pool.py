@@ -107,11 +107,11 @@ def _started() -> Process:
 
 def serve() -> None:
     """Answer the jobs on standard input until it ends; what work prints goes to standard error."""
-    answers = os.fdopen(os.dup(1), "wb")
+    jobs, answers = os.fdopen(os.dup(0), "rb"), os.fdopen(os.dup(1), "wb")  # exit() closes stdin
     os.dup2(2, 1)
     while True:
         try:
-            work, job = pickle.load(sys.stdin.buffer)
+            work, job = pickle.load(jobs)
         except EOFError:
             return
         signal.signal(signal.SIGTERM, _interrupt_once)

@@ -1,5 +1,6 @@
 """The sections of the page: numbers with the best marked, events, settings, figures."""
 
+import warnings
 from collections.abc import Iterable, Mapping, Sequence
 
 import numpy as np
@@ -8,6 +9,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
 from hierarchy import plugins
+from hierarchy.errors import expect
 from hierarchy.words import counted, listed
 from scenarios.draw.figures import drawing, panels
 from scenarios.draw.figures.drawing import ALERT, INK, svg
@@ -17,6 +19,7 @@ from scenarios.draw.figures.timeline import tasks, timeline
 from scenarios.measure.motions import ALIKE, Motion, motions
 from scenarios.measure.runs import Run, caveats, table
 from scenarios.measure.safety import units_of
+from scenarios.recording.blame import blamed
 from scenarios.recording.facts import resolver_facts
 from scenarios.recording.recording import Recording
 from scenarios.templates import render
@@ -103,15 +106,22 @@ def stack(name: str, runs: Sequence[Run], looks: Mapping[str, Look]) -> Markup:
 
 
 def multiples(name: str, found: Sequence[Motion], looks: Mapping[str, Look]) -> Markup:
-    """Return a card for each quantity, with one panel per motion on equal axes."""
+    """Return a card for each quantity, with one panel per motion on equal axes.
+
+    A figure that fails is left out with a warning: it may be a user's code.
+    """
     recordings = {one.label: one.recording for one in found}
     cards = []
-    for panel in plugins.known("figures").values():
-        small = side_by_side(panel, recordings, looks)
-        if any(panel.shows(recordings[label]) for label in small):
-            cards.append((panel, _key(small.values()), [
-                (one, svg(small[one.label], f"{name}, {one.label}: {panel.title}"))
-                for one in found if one.label in small]))
+    for key, panel in plugins.known("figures").items():
+        try:
+            expect("what is registered", panel, Panel, "register a Panel")
+            small = side_by_side(panel, recordings, looks)
+            if any(panel.shows(recordings[label]) for label in small):
+                cards.append((panel, _key(small.values()), [
+                    (one, svg(small[one.label], f"{name}, {one.label}: {panel.title}"))
+                    for one in found if one.label in small]))
+        except (Exception, SystemExit) as error:
+            warnings.warn(f"figure {key!r} is left out: {blamed(error)}", stacklevel=2)
     same = [f"{listed(one.labels)} are the same motion "
             + (f"to {one.apart:.0e} {units_of(one.recording)}" if one.apart else "to the last bit")
             for one in found if len(one.runs) > 1]

@@ -57,8 +57,13 @@ def test_one_run_that_breaks_does_not_lose_the_others(tmp_path, monkeypatch, com
     simulation_is(breaks_under_recursive, monkeypatch)
     done = compare("ellipse", ["recursive", "tpm"], out=tmp_path / "b")
     assert [run.fault for run in done.runs] == ["ArithmeticError: [bold]no[/bold] answer", None]
-    command("replay b")
+    monkeypatch.setenv("HOME", str(tmp_path))
+    command("replay ~/b")
     assert (tmp_path / "b" / "replay.html").exists()
+    command("replay b --out=~/own.html")  # was a folder called ~
+    assert (tmp_path / "own.html").exists()
+    assert "the path is empty" in command("view ''", code=2).err  # was the working directory
+    assert "no file can be called" in command("replay", "x" * 300, code=2).err
     said = command("compare ellipse --resolvers recursive,tpm --workers 1 --out c", code=1).err
     assert "[bold]no[/bold] answer" in said
 

@@ -2,6 +2,7 @@
 
 import copy
 import pickle
+import re
 import shutil
 import sys
 from pathlib import Path
@@ -10,7 +11,7 @@ import numpy as np
 import pytest
 from refusals import refused
 
-from hierarchy import Robot, plugins
+from hierarchy import Hierarchy, Robot, plugins
 from scenarios import Scenario, load, load_run, simulate
 from scenarios.config.sections.tasks import OwnTask
 from scenarios.measure.goals import goals
@@ -84,6 +85,40 @@ class Brittle(Task):
         return np.zeros((1, 7))
 '''
 
+ODD = '''
+import numpy as np
+from scenarios.measure.metrics import Metric
+
+@register("plants", "odd")
+class Odd(KinematicArm):
+    def __init__(self, robot, q, v, period, level, made: str = "", then: str = ""):
+        super().__init__(robot, q, v, period, level)
+        self.then, self.ticks = then, 0
+        exec(made)
+
+    def act(self, command):
+        super().act(command)
+        self.ticks += 1
+        if self.ticks > 10:
+            exec(self.then)
+
+@register("plants", "none")
+def none():
+    return None
+'''
+
+KEPT = '''
+X = np.zeros(7)
+
+@register("resolvers", "kept")
+class Kept(Resolver):
+    name, handles = "kept", "inequalities"
+
+    def solve(self, h, memory=None):
+        X[:] = make("hcod").solve(h).x
+        return Resolution(X)
+'''
+
 
 @pytest.fixture(autouse=True)
 def folder(tmp_path, monkeypatch, no_plugins):
@@ -116,6 +151,23 @@ def test_the_kinds_of_a_plugin_are_explained_and_a_wrong_key_meets_only_its_own(
     assert '\n      "elbow": ' in command("help tasks.kind --plugin doors_of_mine").out
     said = command("check own.toml --plugin doors_of_mine --set tasks.0.joynt=1", code=2).err
     assert "unknown key 'tasks.0.joynt'; did you mean 'tasks.0.joint'? Known: angle," in said
+
+
+@pytest.mark.parametrize(("annotation", "value", "made"), [
+    ("Frame | None", '"joint_4"', "Frame(name='joint_4'"),
+    ("list[Frame]", '["joint_1"]', "[Frame(name='joint_1'"),  # was a list of texts
+    ("Path | None", "{kind = 'still', position = [1.0, 2.0, 3.0]}", "Still("),
+    ("float | None", '"5"', "tasks.1.x: Input should be a valid number, got '5'"),  # was 5.0
+    ("dict[str, float]", "{a = true}", "tasks.1.x.a: Input should be a valid number, got True")])
+def test_keys_that_may_be_left_out_or_are_lists_are_read_as_others(annotation, value, made, folder):
+    (folder / "doors_of_mine.py").write_text(MODULE + f"""
+@register("tasks", "shown")
+def shown(x: {annotation} = None):
+    raise ValueError(repr(x))
+""")
+    plugins.allow("doors_of_mine")
+    refused(made, lambda: simulate(load("own.toml", [
+        f"tasks.1={{kind = 'shown', x = {value}}}"])))
 
 
 def test_the_error_of_a_task_of_a_plugin_has_the_unit_that_its_class_says(folder):
@@ -164,6 +216,78 @@ def test_a_task_that_fails_is_named_and_what_was_run_is_kept(fault, said, comman
     for what in ("check", "run"):
         assert command(f"{what} own.toml --plugin doors_of_mine", code=2).err.strip() == (
             f"hierarchy: error: own.toml: {said}")
+
+
+def with_plant(folder, keys):
+    """Give the scenario another plant."""
+    (folder / "doors_of_mine.py").write_text(MODULE + ODD)
+    scenario = folder / "own.toml"
+    scenario.write_text(scenario.read_text().replace('"weak", share = 0.5', keys))
+
+
+@pytest.mark.parametrize(("keys", "said"), [
+    ('"odd", made = "self.q = None"', "'odd': q: expected 7 finite numbers, got NoneType None"),
+    ('"odd", made = "self.a = np.zeros(9)"', "'odd': a: expected 7 finite numbers, got ndarray"),
+    ('"odd", made = "self.extra = None"', "'odd': extra: expected a Mapping, got NoneType None"),
+    ('"odd", made = "self.extra = {\'push\': np.zeros(2)}"', "'odd': extra: signal 'push': float64 "
+     "of shape (1, 2), expected numbers of shape (1, 3)"),  # a run that nothing could read
+    ('"odd", made = "self.extra = {\'fault\': np.zeros(1)}"', "extra: unknown signal 'fault'"),
+    ('"odd", made = "self.extra = {\'q\': self.q}"', "extra: 'q', which the loop records"),
+    ('"none"', "'none': NoneType None has no method act")])
+def test_what_is_no_plant_is_refused_before_the_run(keys, said, command, folder):
+    with_plant(folder, keys)
+    text = command("run own.toml --plugin doors_of_mine --out a", code=2).err
+    assert "own.toml: plant of kind '" in text
+    assert said in text
+    assert text.count("\n") == 1
+
+
+@pytest.mark.parametrize(("fault", "said"), [
+    ("1 / 0", "plant of kind 'odd': ZeroDivisionError: division by zero"),
+    ("self.a = np.zeros(9)", "plant of kind 'odd': a or extra has changed: could not broadcast "
+     "input array from shape (9,) into shape (7,)"),  # was written over other memory
+    ("self.fault = np.ones(2)", "ValueError: The truth value of an array"),
+    ("self.fault = 'it fell'", "it fell")])
+def test_a_plant_that_fails_is_named_and_what_was_run_is_kept(fault, said, command, folder):
+    with_plant(folder, f'"odd", then = "{fault}"')
+    text = command("run own.toml --plugin doors_of_mine --out a", code=1).err
+    assert text.startswith(f"hierarchy: fault: {said}")
+    assert "from tick 10 on" in text
+    assert load_run("a").ticks in (10, 11)
+
+
+def test_arrays_that_a_plugin_keeps_and_overwrites_are_its_own(command, folder):
+    with_plant(folder, '"odd", then = "command[:] = 99.0"')
+    with (folder / "doors_of_mine.py").open("a") as module:
+        module.write(KEPT)
+    command("run own.toml --plugin doors_of_mine --resolver kept --out a")
+    command("run own.toml --plugin doors_of_mine --resolver hcod --set plant.then=pass --out b")
+    np.testing.assert_array_equal(load_run("a")["command"], load_run("b")["command"])
+    h = Hierarchy.from_levels([(np.eye(7), np.arange(7.0))])
+    first = make("kept").solve(h)
+    make("kept").solve(h.changed(lower=-h.lower, upper=-h.upper))
+    assert first.x[6] == pytest.approx(6.0)
+
+
+@pytest.mark.parametrize(("body", "said"), [
+    ("exit(4)", "metrics 'own' are left out: SystemExit: 4"),
+    ("yield Metric('stack_changes', 'S', 77.0, '')", "metrics 'own' are left out: others yield "
+     "'stack_changes' too"),
+    ("yield recording['q'].mean()", "what it yields[0]: expected a Metric, got float64")])
+def test_metrics_that_fail_are_left_out_and_the_run_is_kept(body, said, command, folder):
+    with_plant(folder, '"odd"')
+    with (folder / "doors_of_mine.py").open("a") as module:
+        module.write(f"\n@register('metrics', 'own')\ndef own(recording, by):\n    {body}\n")
+    with pytest.warns(UserWarning, match=re.escape(said)):
+        command("run own.toml --plugin doors_of_mine --out a")
+    assert '"value": 77.0' not in (folder / "a" / "metrics.json").read_text()
+
+
+def test_a_plant_that_reports_contacts_without_their_depth_keeps_its_run(command, folder):
+    with_plant(folder, '"odd", made = "self.extra = {\'contacts\': np.zeros(())}"')
+    with pytest.warns(UserWarning, match="'contacts' are left out: unknown signal 'contact_depth'"):
+        command("run own.toml --plugin doors_of_mine --out a")
+    assert not load_run("a")["contacts"].any()
 
 
 def test_a_finished_run_of_a_plugin_is_opened_with_the_plugin_only(command):
@@ -223,9 +347,62 @@ def test_a_name_of_an_entry_point_is_found_without_being_imported_first(group, l
     sys.modules.pop("entry_of_mine")
 
 
+@pytest.mark.parametrize(("line", "change", "said"), [
+    ("register('plants', 'odd')(3)", "plant.kind=odd", "plant of kind 'odd': TypeError: 3 is not a "
+     "callable object"),
+    ("register('robots', 'odd')(lambda: 1 / 0)", "robot.model=odd", "robot 'odd' of a plugin: "
+     "ZeroDivisionError: division by zero"),
+    ("register('resolvers', 'odd')(lambda: make('hcod'))", "control.resolver=odd", "resolver 'odd' "
+     "of a plugin: expected a class of Resolver, got function"),
+    ("register('resolvers', 'odd')(type('Odd', (Halved,), {'__post_init__': lambda self: 1 / 0}))",
+     "control.resolver=odd", "resolver 'odd': ZeroDivisionError: division by zero"),
+    ("register('resolvers', 'odd')(type('Odd', (Halved,), {'accuracy': float('nan')}))",
+     "control.resolver=odd", "resolver Odd: accuracy = nan"),  # lost the run when it was saved
+    ("Halved.solve = type('Odd', (Resolver,), {'name': 'odd', 'solve': lambda self, h, memory: "
+     "Resolution(h.start(), 'SOLVED')}).solve", "control.resolver=halved", "resolver 'halved': "
+     "status: expected a Status, got str 'SOLVED'"),
+    ("register('tasks', 'odd')(type('Odd', (JointCoupling,), {'dimension': 1.5}))",
+     "tasks.0={kind='odd', joints={joint_1=1.0}, value=0.1}", "task 'odd': dimension = 1.5: "
+     "expected a whole number"),
+    ("register('sensors', 'odd')(lambda exact: exact.measurement)", "sensor.kind=odd",
+     "sensor of kind 'odd': Measurement <")])
+def test_what_is_registered_and_no_such_thing_is_named(line, change, said, folder):
+    (folder / "doors_of_mine.py").write_text(f"{MODULE}{line}\n")
+    plugins.allow("doors_of_mine")
+    avoiding = ["avoidance={kind = 'separation', obstacles = [{centre = [0.6, 0.6, 0.6]}]}"]
+    refused(said, lambda: simulate(load("own.toml", [change, *avoiding * ("sensor" in change)])))
+
+
+@pytest.mark.parametrize(("line", "said"), [
+    ("register('resolvers', 'tpm')(Halved)", "resolvers: 'tpm' is already"),  # was ignored
+    ("register('robots', 'kuka_lwr')(my_arm)", "robots: 'kuka_lwr' is already"),  # this too
+    ("from solvers.resolver import register as add; Halved.name = 'hcod'; add(Halved)",
+     "resolvers: 'hcod' is already solvers.resolvers.hcod.Hcod"),  # took the place of hcod
+    ("register('tasks', 'odd')(None)", "tasks: 'odd' is None"),
+    ("register('tasks', Weak)", "tasks: name: expected a str, got type"),
+    ("from scenarios.recording.signals import Signal; Signal('odd', 'Pa', (3,), '')",
+     "signal 'odd': shape: expected a str, got tuple (3,)")])
+def test_what_cannot_be_registered_is_refused_on_import(line, said, folder):
+    (folder / "doors_of_mine.py").write_text(f"{MODULE}{line}\n")
+    refused(f"plugin 'doors_of_mine' cannot be imported: {said}", plugins.allow, "doors_of_mine")
+    assert type(make("hcod")).__name__ == "Hcod"
+    refused("'./mine.py': give the name of a module", plugins.allow, "./mine.py")
+
+
+def test_a_figure_that_fails_is_left_out_of_the_page(command, folder, undrawn):
+    figures = ("from scenarios.draw.figures.panels import Panel\nregister('figures', 'odd')(Panel("
+               "'odd', 'Odd', 'rad', 'q', lambda ax, run, colour: exit(3)))\n")
+    robot = "register('robots', 'same')(Robot.named('kuka_lwr'))\n"
+    (folder / "doors_of_mine.py").write_text(f"{MODULE}{figures}{robot}")
+    with pytest.warns(UserWarning, match="figure 'odd' is left out: SystemExit: 3"):
+        command("compare own.toml --plugin doors_of_mine --resolvers hcod,tpm --out a --workers 1 "
+                "--set robot.model=same")
+    assert "Side by side" in (folder / "a" / "index.html").read_text()
+
+
 def test_two_things_of_one_name_are_refused():
     plugins.register("tasks", "thing")(type("One", (), {}))
     refused("tasks: 'thing' is already", plugins.register("tasks", "thing"), type("Two", (), {}))
     refused("unknown group 'task'; did you mean 'tasks'", plugins.register, "task", "thing")
     plugins.register("resolvers", "whole")(int)
-    refused("unknown resolver 'whole'", make, "whole")
+    refused("resolver 'whole' of a plugin: expected a class of Resolver", make, "whole")

@@ -182,7 +182,7 @@ def test_the_rows_are_the_same_in_processes_in_parts_and_on_a_cluster(tmp_path, 
     assert ("tpm", "2", "start.q.6") in first
 
 
-def test_a_run_that_kills_its_process_costs_only_itself(tmp_path):
+def test_a_run_that_kills_its_process_costs_only_itself(tmp_path, capfd):
     jobs = [Job(str(i), "", "deadly" if i == 2 else "tpm") for i in range(6)]
     store = Store(tmp_path / "out")
     with store.opened():
@@ -190,6 +190,7 @@ def test_a_run_that_kills_its_process_costs_only_itself(tmp_path):
     said = {key: one.reason for key, one in store.outcomes().items()}
     killed = "Killed: every process that started this run died"
     assert said == {str(i): killed if i == 2 else None for i in range(6)}
+    assert "Traceback" not in capfd.readouterr().err  # of a process without a standard input
 
 
 def test_what_has_ended_at_ctrl_c_is_given_up_unless_it_is_asked_for(monkeypatch):

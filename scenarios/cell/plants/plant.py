@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from hierarchy import Robot, State
 from hierarchy.avoidance import Obstacles
 from hierarchy.contacts import Contacts
+from hierarchy.errors import brief, expect, finite_numbers, refuse
 from hierarchy.jit import compiled
 from hierarchy.problem import Array
 from hierarchy.task import Level
@@ -166,6 +167,7 @@ def plant_of(scenario: Scenario, start: State, obstacles: Obstacles,
     sensor = JointSensor(section.measurement, control.period, robot)
     plant = section.made(robot, q=start.q, v=start.v, period=control.period, level=control.level,
                          obstacles=obstacles, contacts=contacts)
+    _check(plant, f"plant of kind {section.kind!r}", robot)
     driven = hasattr(plant, "reference_q")
     if section.feedback == "commanded" and not (driven or section.follows):
         raise ScenarioError(f'plant.feedback = "commanded": a plant of kind {section.kind!r} has '
@@ -176,6 +178,14 @@ def plant_of(scenario: Scenario, start: State, obstacles: Obstacles,
         return Apart(plant, lambda q, v: (plant.reference_q.copy(), plant.reference_v.copy()))
     found: Plant = plant
     return found
+
+
+def _check(plant: Any, what: str, robot: Robot) -> None:
+    """Raise a HierarchyError for what is no plant of a robot; a plug-in may return anything."""
+    refuse(not callable(getattr(plant, "act", None)), f"{what}: {brief(plant)} has no method act")
+    for name, size in (("q", robot.nq), ("v", robot.n), ("a", robot.n)):
+        finite_numbers(f"{what}: {name}", getattr(plant, name, None), size)
+    expect(f"{what}: extra", getattr(plant, "extra", None), Mapping, "give {} for no signals")
 
 
 @compiled

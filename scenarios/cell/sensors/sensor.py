@@ -1,7 +1,7 @@
 """What a sensor is, exact distances, and the sensor that [avoidance] and [sensor] ask for."""
 
 from collections.abc import Callable
-from typing import Protocol
+from typing import Any, Protocol
 
 import numpy as np
 
@@ -9,6 +9,7 @@ from hierarchy import HierarchyError, Robot, State
 from hierarchy.avoidance import Measurement, Obstacles, Pairs, Repulsion, measure_pairs
 from hierarchy.avoidance.body import pack_points
 from hierarchy.avoidance.measurement import measure_exactly
+from hierarchy.errors import brief, expect, number, refuse
 from hierarchy.jit import bind
 from hierarchy.problem import Array
 from scenarios.cell.robot import sensed_points
@@ -130,9 +131,19 @@ def sensor_of(scenario: Scenario, start: State,
     with naming("sensor"):
         made: Sensor = scenario.sensor.made(robot, exact=exact, reach=max(*reach, danger),
                                             body=body, tip=tip)
+    _check(made, f"sensor of kind {scenario.sensor.kind!r}")
     if sensor is None and not scenario.sensor.is_recorded:
         exact.check_start(start)
     return made
+
+
+def _check(sensor: Any, what: str) -> None:
+    """Raise a HierarchyError for what is no sensor; a plug-in may return anything."""
+    refuse(not callable(getattr(sensor, "measure", None)),
+           f"{what}: {brief(sensor)} has no method measure")
+    for name, kind in (("measurement", Measurement), ("obstacles", Obstacles)):
+        expect(f"{what}: {name}", getattr(sensor, name, None), kind, "give that of `exact`")
+    number(f"{what}: outside", getattr(sensor, "outside", None), least=0.0)
 
 
 def make_obstacles(sections: tuple[ObstacleSection, ...]) -> Obstacles:

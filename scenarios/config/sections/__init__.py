@@ -121,8 +121,12 @@ class OneOf:
     def _kinds(self, annotation: Any) -> dict[str, type[Section]]:
         if self.own is None:
             return {kind: one for one in get_args(annotation) for kind in kinds_of(one)}
-        return {kind: one if isinstance(one, type) and issubclass(one, Section)
-                else self.own.of(one) for kind, one in plugins.registered(self.own.group).items()}
+        found = {}
+        for kind, one in plugins.registered(self.own.group).items():
+            with errors.of_user(f"{self.own.group[:-1]} of kind {kind!r}"):
+                found[kind] = one if isinstance(one, type) and issubclass(
+                    one, Section) else self.own.of(one)
+        return found
 
     def __get_pydantic_core_schema__(self, source: Any, handler: Any) -> Any:
         kinds = [handler.generate_schema(section) for section in self.sections(source)]

@@ -13,12 +13,13 @@ from collections.abc import Callable
 from contextlib import suppress
 from functools import cache
 from pkgutil import resolve_name
-from typing import TYPE_CHECKING, Any, ClassVar, Self, get_args, get_origin, get_type_hints
+from types import UnionType
+from typing import TYPE_CHECKING, Any, ClassVar, Self, Union, get_args, get_origin, get_type_hints
 
 from pydantic import ConfigDict, Field, create_model
 
 from hierarchy import plugins
-from hierarchy.errors import HierarchyError
+from hierarchy.errors import of_user
 from hierarchy.paths import Path
 from hierarchy.plugins import Group
 from scenarios.config.sections import Finite, Flag, ScenarioError, Section, Whole, naming
@@ -97,12 +98,8 @@ class OwnSection(PartSection):
         keys = {name.removeprefix(_KEY): value for name, value in self
                 if name.startswith(_KEY) and value is not None}
         provided = {name: value for name, value in given.items() if name in GIVEN[self.group]}
-        try:
+        with of_user(f"{self.group[:-1]} of kind {self.kind!r}", ScenarioError):
             return _called(type(self).maker, {"robot": robot, **keys, **provided})
-        except Exception as error:
-            kind = "" if isinstance(error, HierarchyError) else f"{type(error).__name__}: "
-            raise ScenarioError(f"{self.group[:-1]} of kind {self.kind!r}: {kind}{error}"
-                                ) from error
 
 
 def _again(own: type[OwnSection], kind: str, data: dict[str, Any]) -> OwnSection:
@@ -117,12 +114,18 @@ def _called(maker: Maker, given: dict[str, Any]) -> Any:
 
 def _made(key: str, annotation: Any, value: Any, robot: Robot) -> Any:
     """Return the value of a key as the maker wants it: frames by name, paths by their table."""
-    from hierarchy.robot import Frame
-
-    if isinstance(value, str) and Frame in (annotation, *get_args(annotation)):
+    if type(value) in (list, tuple):
+        return type(value)(_made(key, annotation, one, robot) for one in value)
+    if isinstance(value, str) and _has_frame(annotation):
         with naming(key):
             return robot.frame(value)
     return value.make() if isinstance(value, AnyPath) else value
+
+
+def _has_frame(annotation: Any) -> bool:
+    from hierarchy.robot import Frame
+
+    return annotation is Frame or any(map(_has_frame, get_args(annotation)))
 
 
 def _parameters(maker: Maker) -> dict[str, inspect.Parameter]:
@@ -144,6 +147,7 @@ def _in_a_file(annotation: Any) -> Any:
     if isinstance(annotation, type) and annotation in kinds:
         return kinds[annotation]
     origin, inside = get_origin(annotation), get_args(annotation)
-    if origin in (tuple, list):
-        return origin[tuple(part if part is ... else _in_a_file(part) for part in inside)]
+    if origin in (tuple, list, dict, Union, UnionType):
+        of = Union if origin is UnionType else origin
+        return of[tuple(part if part is ... else _in_a_file(part) for part in inside)]
     return annotation
