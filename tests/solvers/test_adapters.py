@@ -166,6 +166,9 @@ def test_limits_that_contradict_each_other_are_no_solution_and_named(configurati
     with pytest.raises(NoSolutionFound, match=r"limits cannot all hold; at best these are violated:"
                        r" SimpleNamespace, row 0 by .*joint_1 by"):
         solve_ik(configuration, hand, DT, limits=[slow, sums])
+    with pytest.raises(NoSolutionFound, match=r"the constraints do not hold with weighted.*, which "
+                       "is not strict; these are violated: .* by"):
+        solve_ik(configuration, [posture_task(Q + 0.1)], DT, "weighted", constraints=hand)
 
 
 def test_rounding_in_a_row_of_a_limit_holds_no_joint(configuration):
