@@ -20,6 +20,7 @@ from hierarchy.words import listed
 from solvers.adapters.packing import CONTRADICT, GIVEN, ODD, damp, write_limits, write_tasks
 
 _AXES = ("x", "y", "z", "about x", "about y", "about z")
+_FAINT = 1e-8  # singular value over the largest: less is no direction
 
 Names = Callable[[], Sequence[str]]
 Solve = Callable[[Hierarchy], Array]
@@ -58,15 +59,18 @@ class ContradictionError(HierarchyError):
 
 def _row_names(packed: Packed) -> tuple[str, ...]:
     """Name each row: by its joint if it is about a single one, else by its limit or task."""
-    known = list(packed.joints())
-    above, free = (packed.sizes[0] if packed.kept[:1] == ["limits"] else 0), packed.count
-    free -= packed.sizes[-1] if packed.weight else 0
-    of_tasks = [name for level in packed.read for one in level
-                for name in _names_of(*one)][:free - above]
+    known, rows = list(packed.joints()), list[str]()
     of_limits = [f"{name}, row {i}" for name, i, row, side in packed.limit_rows()
                  if side < np.inf and np.count_nonzero(row) != 1]
-    rows = of_limits + [""] * (above - len(of_limits)) + of_tasks
-    rows += [f"{packed.names[-1]}, row {i}" for i in range(packed.count - free)]
+    for k, (level, size) in enumerate(zip(packed.kept, packed.sizes, strict=True)):
+        if level == "limits":
+            own = [*of_limits, *[""] * (size - len(of_limits))]
+        else:
+            tasks = packed.read[0] if level == "constraints" else level
+            own = [name for one in tasks for name in _names_of(*one)]
+        if k in packed.mixed or len(own) != size:
+            own = [f"{packed.names[k]}, row {i}" for i in range(size)]
+        rows += own
     for i, (row, name) in enumerate(zip(packed.A, rows, strict=False)):
         of_row = [known[c] for c in np.flatnonzero(row)]
         if not name or (len(of_row) == 1 and name.startswith("row ")):
@@ -115,6 +119,7 @@ class Packed:
         self.A, self.sides = np.empty((most + 2 * n, n)), np.empty((2, most + 2 * n))
         self.count = self.filled = 0
         self.weight = 0.0  # of the step in the last level, whose rows in the table are `last`
+        self.mixed = set[int]()  # levels whose rows are no longer those of their tasks
         self.last = (0, 0)
         self.kept: list[str | Sequence[_Read]] = []
         self.sizes: list[int] = []
@@ -202,18 +207,25 @@ class Packed:
                                last)
             if self.weight > 0.0:
                 last = self.count + self.n
+                self.mixed.add(len(self.kept))
         self.keep(level, last)
 
     def hold(self, solve: Solve | None) -> None:
-        """Make the last level, which weighs its step, ask for what it then reaches."""
+        """Make the last level, which weighs its step, hold what it then reaches.
+
+        In orthonormal directions: rows of a singular task would be met, beside limits that act, by
+        a rounding that no resolver can verify.
+        """
         if solve is None:
             raise HierarchyError(f"{self.names[-1]}: damped, and not the last level: what it "
                                  "leaves to the levels below needs a resolver")
         x = solve(self.hierarchy())
         first = self.count = self.count - self.sizes.pop()
         last = int(write_tasks(self.table, *self.last, self.period, self.A, self.sides, first))
-        self.weight = 0.0
-        self.sides[:, first:last] = self.A[first:last] @ x
+        _, values, directions = np.linalg.svd(self.A[first:last], full_matrices=False)
+        held = directions[values > _FAINT * values.max(initial=0.0)]
+        last, self.weight = first + len(held), 0.0
+        self.A[first:last], self.sides[:, first:last] = held, held @ x
         self.keep(self.kept.pop(), last)
 
     @property

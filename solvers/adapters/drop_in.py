@@ -56,7 +56,7 @@ def _solved(resolver: Resolver, tolerance: float, failed: Failed, h: Hierarchy) 
     resolution = resolver.solve(h)
     if resolution.status is not Status.SOLVED:
         raise failed(h, resolution, f"{resolver.name}: {resolution.status}")
-    if conflict := _conflict(h, resolution.x, tolerance):
+    if conflict := _conflict(resolver, h, resolution.x, tolerance):
         raise failed(h, resolution, conflict)
     return np.asarray(resolution.x)
 
@@ -87,8 +87,8 @@ def _qp_solvers() -> frozenset[str]:
     return frozenset(module.name.rstrip("_") for module in iter_modules(solvers.__path__))
 
 
-def _conflict(h: Hierarchy, x: Array, tolerance: float) -> str:
-    """Return which limits or constraints contradict each other, those that miss; "" if none."""
+def _conflict(resolver: Resolver, h: Hierarchy, x: Array, tolerance: float) -> str:
+    """Return which limits or constraints x misses, a strict resolver at best; "" if none."""
     A, lower, upper, _ = h.rows
     for name, (first, last) in zip(h.names, pairwise(h.offsets.tolist()), strict=True):
         if name not in _ALWAYS:
@@ -97,5 +97,7 @@ def _conflict(h: Hierarchy, x: Array, tolerance: float) -> str:
             misses, names = np.abs(h.slacks(x)), h.named() if h.named else ()
             rows = [f"{names[i]} by {misses[i]:.3g}" for i in range(first, last)
                     if misses[i] > tolerance]
-            return (f"the {name} cannot all hold; at best these are violated: {listed(rows)}")
+            why = ("cannot all hold; at best" if resolver.strict
+                   else f"do not hold with {resolver.label}, which is not strict;")
+            return f"the {name} {why} these are violated: {listed(rows)}"
     return ""

@@ -126,6 +126,26 @@ def test_light_damping_leaves_every_answer_verified(lm_damping, turned):
             assert solve_ik(there, levels, DT).any()
 
 
+@pytest.mark.parametrize("seed", [1, 5, 13])
+def test_a_damped_task_out_of_reach_above_others_never_leaves_a_tick_without_an_answer(seed):
+    """Its nearly singular rows were to keep their values beside limits that act: it stopped."""
+    import pink
+
+    robot, rng = Robot.named("kuka_lwr"), np.random.default_rng(seed)
+    low, high = robot.model.lowerPositionLimit, robot.model.upperPositionLimit
+    there = pink.Configuration(robot.model, robot.model.createData(),
+                               np.clip(robot.rest + 0.1 * rng.normal(size=7), low, high))
+    hand = frame_task(there, shift=0.3 * rng.normal(size=3), turn=0.0, orientation=1.0)
+    hand.lm_damping = 1e-6
+    posture = posture_task(robot.rest, 1e-3)
+    for _ in range(150):
+        v = solve_ik(there, [hand, posture], DT)
+        first = solve_ik(there, [hand], DT)
+        J = hand.compute_jacobian(there)
+        np.testing.assert_allclose(J @ v, J @ first, atol=1e-7)
+        there.update(np.clip(there.q + DT * v, low, high))
+
+
 @pytest.mark.parametrize("scene", SCENES)
 def test_one_level_is_the_exact_minimum_of_pinks_cost_under_its_limits(configuration, scene):
     import pink
@@ -166,6 +186,9 @@ def test_limits_that_contradict_each_other_are_no_solution_and_named(configurati
     with pytest.raises(NoSolutionFound, match=r"limits cannot all hold; at best these are violated:"
                        r" SimpleNamespace, row 0 by .*joint_1 by"):
         solve_ik(configuration, hand, DT, limits=[slow, sums])
+    with pytest.raises(NoSolutionFound, match=r"the constraints do not hold with weighted.*, which "
+                       "is not strict; these are violated: .* by"):
+        solve_ik(configuration, [posture_task(Q + 0.1)], DT, "weighted", constraints=hand)
 
 
 def test_rounding_in_a_row_of_a_limit_holds_no_joint(configuration):
