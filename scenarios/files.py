@@ -154,8 +154,8 @@ def whole(folder: str | Path) -> Iterator[Path]:
     Whatever interrupts the writing leaves nothing behind. `folder` must be new or empty.
     """
     path = _absolute(folder)
-    path.parent.mkdir(parents=True, exist_ok=True)
     with named(path):
+        path.parent.mkdir(parents=True, exist_ok=True)
         partial = _partial(path)
     try:
         with named(path):

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import sys
 import time
 from contextlib import suppress
 from pathlib import Path
@@ -12,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from scenarios.cli.options import PORT, AsJson, Browser, Plugins, Port, Run, Runs, app, output
-from scenarios.cli.terminal import kept_in, print_files, print_json
+from scenarios.cli.terminal import exit_code, kept_in, print_files, print_json
 
 if TYPE_CHECKING:
     from scenarios.config import Scenario
@@ -80,7 +79,7 @@ def show_live(scenario: Scenario, folder: Path, port: int, speed: float, browser
     from scenarios.draw.viewer.server import announce, served
 
     live = Live(scenario)
-    page, kept = LivePage(live, speed), None
+    page, kept, lost = LivePage(live, speed), None, False
     with served(port, page.html, page.answer) as address:
         try:
             announce(address, browser)
@@ -94,24 +93,28 @@ def show_live(scenario: Scenario, folder: Path, port: int, speed: float, browser
                 last = now
                 if live.over and kept is not live.recorder:
                     kept = live.recorder
-                    _keep(live, folder)
+                    lost |= _keep(live, folder)
         except KeyboardInterrupt:
             print()
             if not live.over:
-                _keep(live, folder)
-    return 1 if live.ending else 0
+                lost |= _keep(live, folder)
+    return int(lost or live.ending is not None)
 
 
-def _keep(live: Live, folder: Path) -> None:
-    """Save the run in its folder, or in the next free one beside it."""
+def _keep(live: Live, folder: Path) -> bool:
+    """Save the run in its folder, or in the next free one beside it; return whether that fails."""
     from scenarios.files import next_free
+    from scenarios.measure.run_folder import kept
 
     used = folder.exists() and any(folder.iterdir())
     free = next_free(folder) if used else folder
-    recording = live.save(free)
-    print(kept_in(free, recording), flush=True)
-    if recording.fault:
-        print(f"hierarchy: fault: {recording.fault}", file=sys.stderr)
+    recording = live.recording()
+    lost = kept(recording, free, live.changes)
+    if lost is None:
+        print(kept_in(free, recording), flush=True)
+    for fault in (recording.fault, lost):
+        exit_code(fault)
+    return lost is not None
 
 
 @app.command()

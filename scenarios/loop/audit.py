@@ -22,7 +22,8 @@ Signals = Mapping[str, ArrayLike]
 Audit = Callable[[int, Controller], Signals]
 """Examines a tick that the controller has just answered; returns its values of signals by name.
 
-The first value of a signal decides its shape and type.
+The first value of a signal decides its type. One that is no signal, that the loop records or that
+has another shape ends the run.
 """
 
 

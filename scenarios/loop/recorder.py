@@ -1,6 +1,6 @@
 """Writes one row per tick while the loop runs; nothing is computed from it there."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Any, NamedTuple
 
@@ -79,13 +79,8 @@ class Recorder:
         self._desired = rows(3, 3, count=ticks if cell.tasks.position else 0)
         self._answers = rows(len(controller.resolution.x), count=ticks if cell.contacts else 0)
         self._plant = f"plant of kind {cell.scenario.plant.kind!r}"
-        with naming(f"{self._plant}: extra"):
-            self._extra = {name: np.empty((ticks, *np.shape(value)), np.asarray(value).dtype)
-                           for name, value in cell.plant.extra.items()}
-            for name in self._extra:
-                if known(name) is None:
-                    raise UnknownNameError("signal", name, plugins.known("signals"))
-            check_shapes(self._extra, T=ticks, nq=robot.nq, n=robot.n)
+        self._extra = {name: np.empty((ticks, *np.shape(value)), np.asarray(value).dtype)
+                       for name, value in cell.plant.extra.items()}
         self._weights = np.empty(ticks if controller.blend else 0)
         self._events: list[Event] = []
         self._always: tuple[Audit, ...] = (Truth(cell),)
@@ -93,11 +88,9 @@ class Recorder:
         self._audited: dict[str, NDArray[Any]] = {}
         self.facts = facts_of(cell.scenario, robot, cell.contacts)
         self.follow(controller)
-        if self._extra:
-            none = slice(0)
-            own = self._of_controller(_Log._make([rows[none] for rows in self._log]), none)
-            for name in self._extra:
-                refuse(name in own, f"{self._plant}: extra: {name!r}, which the loop records")
+        none = slice(0)
+        self._own = {*self._of_controller(_Log._make([of[none] for of in self._log]), none)}
+        self._check(f"{self._plant}: extra", self._extra)
 
     def follow(self, controller: Controller) -> None:
         """Continue with this controller, which has the same robot, plant and measured points."""
@@ -157,10 +150,21 @@ class Recorder:
                 if name not in self._audited:
                     first = np.asarray(given)
                     nothing = {"f": np.nan, "i": -1}.get(first.dtype.kind, 0)
-                    self._audited[name] = np.full((len(self._log.t), *first.shape), nothing,
-                                                  first.dtype)
+                    rows = np.full((len(self._log.t), *first.shape), nothing, first.dtype)
+                    self._check("an audit", {name: rows})
+                    self._audited[name] = rows
                 self._audited[name][k] = given
         self.ticks = k + 1
+
+    def _check(self, what: str, signals: Mapping[str, NDArray[Any]]) -> None:
+        """Raise a HierarchyError for a further signal that is unknown, recorded or misshapen."""
+        robot = self._cell.robot
+        with naming(what):
+            for name in signals:
+                refuse(name in self._own, f"{name!r}, which the loop records")
+                if known(name) is None:
+                    raise UnknownNameError("signal", name, plugins.known("signals"))
+            check_shapes(signals, T=len(self._log.t), nq=robot.nq, n=robot.n)
 
     def finish(self, scenario: Scenario, fault: str | None) -> Recording:
         """Return the run as recorded so far."""

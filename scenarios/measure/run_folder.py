@@ -5,6 +5,7 @@ import json
 import os
 import platform
 import tempfile
+from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
@@ -31,12 +32,14 @@ _PACKAGES = ("task-hierarchy", "numpy", "numba", "pin", "qpsolvers", "proxsuite"
 _EVENT = np.dtype([("tick", np.int64), ("kind", "U24"), ("action", "U8")])
 
 
-def save(recording: Recording, folder: str | Path) -> Path:
+def save(recording: Recording, folder: str | Path,
+         changes: Sequence[Mapping[str, Any]] = ()) -> Path:
     """Write a run's folder, which must be new or empty, whole or not at all; return its path.
 
     The files are `run.npz` (the signals by name, `orders`, `fault` and `events`), `timings.npz`
     (the signals time_*), `facts.json`, `depth.npz` if there is a camera image, `metrics.json`, with
-    the goals, `scenario.toml` as run, and `versions.json`; `hierarchy figures` adds the figures.
+    the goals, `scenario.toml` as run, `versions.json`, and `changes.json` with the `changes` of a
+    live run, if there are any; `hierarchy figures` adds the figures.
     Only times are measured: the same scenario and versions give the same bytes of `run.npz`.
     """
     expect("save", recording, Recording, "give what `simulate` returns")
@@ -55,22 +58,25 @@ def save(recording: Recording, folder: str | Path) -> Path:
         write_json(partial / "facts.json", dataclasses.asdict(recording.facts))
         write_json(partial / "versions.json", versions())
         (partial / "scenario.toml").write_text(recording.scenario.to_toml(), encoding="utf-8")
+        if changes:
+            write_json(partial / "changes.json", changes)
         write_json(partial / "metrics.json", metrics.as_plain_data(recording)
                    | verdict(recording).as_plain_data())
     return path
 
 
-def kept(recording: Recording, folder: Path) -> str | None:
+def kept(recording: Recording, folder: Path,
+         changes: Sequence[Mapping[str, Any]] = ()) -> str | None:
     """Save a run, where `folder` cannot be written in the system's temporary folder.
 
     Returns None, or why and where; or why in neither.
     """
     try:
-        save(recording, folder)
+        save(recording, folder, changes)
     except OutputError as error:
         spare = Path(tempfile.mkdtemp(prefix="hierarchy-"))
         try:
-            return f"{error}; the run is in {save(recording, spare / 'run')}"
+            return f"{error}; the run is in {save(recording, spare / 'run', changes)}"
         except OutputError as too:
             spare.rmdir()
             return f"{error}; {too}"

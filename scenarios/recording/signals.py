@@ -17,6 +17,8 @@ from hierarchy.errors import expect, refuse, text
 from hierarchy.records import check_fields
 
 OTHER = "/other"  # the topic of what has no other
+_DRAWN = "/tf", "/scene", "/events"  # topics of what Foxglove draws
+_TAKEN = "orders", "fault", "events", "tasks", "file", "allow_pickle"  # in files, and by numpy
 
 
 @dataclass(frozen=True)
@@ -36,7 +38,13 @@ class Signal:
     topic: str = OTHER
 
     def __post_init__(self) -> None:
-        check_fields(self, f"signal {self.name!r}", {str: text})
+        what = f"signal {self.name!r}"
+        check_fields(self, what, {str: text})
+        refuse(not re.fullmatch(r"[a-zA-Z]\w*\*?", self.name) or self.name in _TAKEN, f"{what}: "
+               f'a name has letters, digits and "_", begins with a letter, and is none of '
+               f"{', '.join(_TAKEN)}")
+        refuse(not re.fullmatch(r"/\w+", self.topic) or self.topic in _DRAWN, f"{what}: topic = "
+               f"{self.topic!r}: expected / and a word, none of {', '.join(_DRAWN)}")
 
     @property
     def constant(self) -> bool:
@@ -51,6 +59,8 @@ def known(name: str) -> Signal | None:
          if key[-1:] == "*" and name.startswith(key[:-1])), None)
     if found is not None:
         expect(f"signals: {name!r}", found, Signal, "register a Signal")
+        refuse(found.name != name and found.name[-1] != "*",
+               f"signals: {name!r} is registered with a Signal called {found.name!r}")
     return found
 
 

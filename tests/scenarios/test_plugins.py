@@ -364,6 +364,11 @@ def test_a_name_of_an_entry_point_is_found_without_being_imported_first(group, l
     ("register('tasks', 'odd')(type('Odd', (JointCoupling,), {'dimension': 1.5}))",
      "tasks.0={kind='odd', joints={joint_1=1.0}, value=0.1}", "task 'odd': dimension = 1.5: "
      "expected a whole number"),
+    ("from scenarios.recording.signals import Signal; register('signals', 'file')(Signal('odd', "
+     "'Pa', '(T,)', '')); register('plants', 'odd')(type('Odd', (KinematicArm,), {'__init__': "
+     "lambda self, robot, q, v, period, level: KinematicArm.__init__(self, robot, q, v, period, "
+     "level) or setattr(self, 'extra', {'file': q[0]})}))", "plant={kind='odd'}", "signals: 'file' "
+     "is registered with a Signal called 'odd'"),
     ("register('sensors', 'odd')(lambda exact: exact.measurement)", "sensor.kind=odd",
      "sensor of kind 'odd': Measurement <")])
 def test_what_is_registered_and_no_such_thing_is_named(line, change, said, folder):
@@ -381,7 +386,11 @@ def test_what_is_registered_and_no_such_thing_is_named(line, change, said, folde
     ("register('tasks', 'odd')(None)", "tasks: 'odd' is None"),
     ("register('tasks', Weak)", "tasks: name: expected a str, got type"),
     ("from scenarios.recording.signals import Signal; Signal('odd', 'Pa', (3,), '')",
-     "signal 'odd': shape: expected a str, got tuple (3,)")])
+     "signal 'odd': shape: expected a str, got tuple (3,)"),
+    ("from scenarios.recording.signals import Signal; Signal('odd', 'Pa', '(T,)', '', '/tf')",
+     "signal 'odd': topic = '/tf': expected / and a word, none of /tf, "),  # broke its messages
+    ("from scenarios.recording.signals import Signal; Signal('file', 'Pa', '(T,)', '')",
+     "signal 'file': a name has letters, digits and \"_\"")])  # lost the run
 def test_what_cannot_be_registered_is_refused_on_import(line, said, folder):
     (folder / "doors_of_mine.py").write_text(f"{MODULE}{line}\n")
     refused(f"plugin 'doors_of_mine' cannot be imported: {said}", plugins.allow, "doors_of_mine")

@@ -104,6 +104,18 @@ def test_a_run_interrupted_while_its_levels_are_judged_is_kept(monkeypatch, tmp_
     assert ((run["level_fate"] == Fate.UNKNOWN).all(axis=1) == (np.arange(10) >= 5)).all()
 
 
+@pytest.mark.parametrize(("given", "said"), [
+    ({"push": np.zeros(2)}, "signal 'push': float64 of shape (20, 2), expected numbers of shape"),
+    ({"push": None}, "signal 'push': object of shape (20,)"),  # both: a run that nothing could read
+    ({"orders": 1.0}, "unknown signal 'orders'"),  # could not be saved
+    ({"q": np.zeros(7)}, "'q', which the loop records")])  # took its place
+def test_what_an_audit_gives_that_is_no_further_signal_ends_the_run(given, said, tmp_path):
+    run = simulate(load("ellipse", ["control.duration=0.02"]),
+                   audits=[lambda tick, _: given if tick == 3 else {}])
+    assert run.fault.startswith(f"an audit: {said}")
+    assert load_run(save(run, tmp_path / "run")).ticks == 3
+
+
 @pytest.mark.parametrize(("speed", "acceleration", "said"), [
     (np.inf, np.inf, "the state is not finite from tick 0 on (t = 0.000 s)"),
     (1.5e3, 0.0, "the motion has diverged: joint joint_3 moves at 1.5e+03 rad/s, more than 1000, "

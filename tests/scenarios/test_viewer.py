@@ -4,6 +4,7 @@ import base64
 import itertools
 import json
 import re
+import tempfile
 import time
 from contextlib import closing, suppress
 from http.client import HTTPConnection
@@ -189,6 +190,19 @@ def test_the_command_of_a_live_run_ends_with_1_where_the_run_did_not_end(
     run = load("ellipse", ["control.duration=0.01"])
     assert shown.show_live(run, tmp_path / "run", 0, 1.0, browser=False, wait=False) == code
     assert load_run(tmp_path / "run").ticks == ticks
+
+
+def test_a_live_run_that_cannot_be_saved_where_it_should_is_saved_elsewhere(
+        tmp_path, monkeypatch, capsys):
+    sleep = mock.Mock(side_effect=[None, KeyboardInterrupt])
+    monkeypatch.setattr(shown, "time", mock.Mock(sleep=sleep, monotonic=itertools.count().__next__))
+    monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
+    (tmp_path / "file").touch()
+    run = load("ellipse", ["control.duration=0.01"])
+    assert shown.show_live(run, tmp_path / "file" / "run", 0, 1.0, browser=False, wait=False) == 1
+    said = capsys.readouterr().err.strip()
+    assert "file is no folder; the run is in " in said
+    assert load_run(said.partition("the run is in ")[2]).ticks == 10
 
 
 @pytest.mark.parametrize(("headers", "own"), [

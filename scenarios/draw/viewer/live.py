@@ -1,6 +1,5 @@
 """A run that is changed by hand while it goes on; nothing here depends on a page."""
 
-import json
 import time
 from collections.abc import Mapping
 from contextlib import suppress
@@ -152,10 +151,7 @@ class Live:
     def save(self, folder: Path) -> Recording:
         """Write the run's folder as `hierarchy run` does, and any changes to `changes.json`."""
         recording = self.recording()
-        save(recording, folder)
-        if self.changes:
-            (folder / "changes.json").write_text(json.dumps(self.changes, indent=1) + "\n",
-                                                 encoding="utf-8")
+        save(recording, folder, self.changes)
         return recording
 
     def _take_over(self, scenario: Scenario, changes: Mapping[str, Any]) -> None:
