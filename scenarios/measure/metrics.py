@@ -205,7 +205,7 @@ def measure(recording: Recording, settle: float = 2.0,
                 refuse(metric.name in found, f"others yield {metric.name!r} too")
             found |= {metric.name: metric for metric in metrics}
         except (Exception, SystemExit) as error:  # a user's code, which must not cost the run
-            warnings.warn(f"metrics {name!r} are left out: {blamed(error)}", stacklevel=2)
+            warnings.warn(f"metrics {name!r} are left out: {blamed(error)}", stacklevel=1)
     groups = {group: place for place, group in enumerate(_GROUPS)}
     return dict(sorted(found.items(), key=lambda item: groups.get(item[1].group, len(groups))))
 

@@ -121,7 +121,7 @@ def multiples(name: str, found: Sequence[Motion], looks: Mapping[str, Look]) -> 
                     (one, svg(small[one.label], f"{name}, {one.label}: {panel.title}"))
                     for one in found if one.label in small]))
         except (Exception, SystemExit) as error:
-            warnings.warn(f"figure {key!r} is left out: {blamed(error)}", stacklevel=2)
+            warnings.warn(f"figure {key!r} is left out: {blamed(error)}", stacklevel=1)
     same = [f"{listed(one.labels)} are the same motion "
             + (f"to {one.apart:.0e} {units_of(one.recording)}" if one.apart else "to the last bit")
             for one in found if len(one.runs) > 1]
