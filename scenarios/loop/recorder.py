@@ -76,6 +76,7 @@ class Recorder:
         self._log = _Log(rows(), rows(robot.nq), rows(robot.n), rows(robot.n),
                          rows(len(controller.sent)), rows(3), rows(), rows(points),
                          np.full((ticks, len(_CHOICES)), -1, dtype=np.int16), rows(len(_TIMES)))
+        self._a, self._command = self._log.a, self._log.command
         self._desired = rows(3, 3, count=ticks if cell.tasks.position else 0)
         self._answers = rows(len(controller.resolution.x), count=ticks if cell.contacts else 0)
         self._plant = f"plant of kind {cell.scenario.plant.kind!r}"
@@ -114,11 +115,12 @@ class Recorder:
         index = self._orders.setdefault(order, len(self._orders))
         active = cell.sensor.measurement.active + 1 if AVOIDANCE in order and cell.sensor else -1
         resolution, plant = controller.resolution, cell.plant
-        self._log.command[k] = controller.sent
+        self._command[k] = controller.sent
         try:
-            self._log.a[k] = plant.a
-            for name, values in self._extra.items():
-                values[k] = plant.extra[name]
+            self._a[k] = plant.a
+            if self._extra:
+                for name, values in self._extra.items():
+                    values[k] = plant.extra[name]
         except (AttributeError, KeyError, TypeError, ValueError) as error:  # a user's code
             raise HierarchyError(f"{self._plant}: a or extra has changed: {error}") from error
         finite = self._write_rest(
