@@ -240,8 +240,9 @@ def test_a_solver_of_qpsolvers_is_answered_by_hcod_with_a_note(configuration):
     hand = [frame_task(configuration)]
     expected = solve_ik(configuration, hand, DT)
     with pytest.warns(UserWarning, match="solver 'proxqp' minimises one cost; the tasks are "
-                                         "resolved in strict order by 'hcod'"):
+                                         "resolved in strict order by 'hcod'") as said:
         np.testing.assert_array_equal(solve_ik(configuration, hand, DT, "proxqp"), expected)
+    assert said[0].filename == __file__
     solve_ik(configuration, hand, DT, "proxqp")  # said once; a second warning would be an error
     with pytest.warns(UserWarning, match="without effect: eps_abs, max_iter"):
         solve_ik(configuration, hand, DT, solver="mosek", max_iter=3, eps_abs=1e-3)
