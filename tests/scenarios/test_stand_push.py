@@ -89,6 +89,17 @@ def test_what_is_held_after_braking_is_approached_in_torque_steps():
     np.testing.assert_allclose(np.diff(away), -0.3, atol=1e-9)
 
 
+def test_a_foot_keeps_its_load_after_a_tick_without_an_answer_before_it_lifts():
+    """The zeros of a failed solve were what it carried, and all of it was dropped at once."""
+    run = simulate(load("step", {
+        "control.duration": 0.2, "contacts.1.open": [[0.3, 0.4]], "faults": [
+            {"kind": "status", "status": "numerical_failure", "at": 0.099, "duration": 0.001}]}))
+    assert run.events == ((99, "numerical_failure", "brake"),)
+    foot = run["planned_force"][:, 4:, 2].sum(axis=1)
+    assert np.isnan(foot[99])
+    np.testing.assert_allclose(foot[[100, 150]] / foot[98], [1.0, 0.75], rtol=1e-6)
+
+
 # Not of robots of packages: the certificate rejects 13 of 150 answers of stand-g1, and 2 of
 # stand-talos, that are right to 1e-14, as a proof in 120 digits shows.
 @pytest.mark.parametrize("name", sorted(
