@@ -139,9 +139,13 @@ class Scenario(Section):
         if self.tasks and self.control.stack == "switched":
             yield '[[tasks]] goes with control.stack = "hierarchical"'
         names = [task.title for task in self.tasks]
-        names += [f"{task.title} turned" for task in self.tasks if len(task.shown) > 1]
         names += [name for name in ("position", "pointing", "posture") if getattr(self, name)]
         yield from alike(names)
+        known = {name.replace(" ", "_") for name in names}
+        for task in self.tasks:
+            turned = f"{task.title} turned"
+            if len(task.shown) > 1 and turned.replace(" ", "_") in known:
+                yield f"task {task.title!r}: another one has the name of its rotation, {turned!r}"
         listed = [task for task in self.tasks if task.kind == "collision"]
         if listed and (self.avoidance is None or self.avoidance.kind != "separation"):
             yield ('a task of kind "collision" needs [avoidance] with kind = '

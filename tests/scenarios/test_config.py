@@ -125,7 +125,8 @@ def test_a_stack_that_asks_for_nothing_is_refused(tmp_path):
     refused("2 tasks are named 'a_b'", load, path, [  # the errors of both would be one signal
         "control.stack=hierarchical",
         "tasks=[{kind='posture', name='a b'}, {kind='com', name='a_b'}]"])
-    refused("2 tasks are named 'a_turned'", load, path, [  # and here one metric, as below
+    # and here one metric, as below
+    refused("task 'a': another one has the name of its rotation, 'a turned'", load, path, [
         "control.stack=hierarchical",
         "tasks=[{kind='pose', name='a', frame='tool0'}, {kind='com', name='a turned'}]"])
     refused("2 tasks are named 'joint_limits'", lambda: build(load("reach-torque", [
