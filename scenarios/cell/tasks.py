@@ -16,7 +16,7 @@ from scenarios.config.sections import naming
 from scenarios.config.sections.avoidance import AvoidanceSection, SeparationSection
 from scenarios.config.sections.control import ControlSection
 from scenarios.config.sections.references import References
-from scenarios.config.sections.tasks import LimitsSection, Made
+from scenarios.config.sections.tasks import LimitsSection, Made, alike
 
 
 class Tasks(NamedTuple):
@@ -60,6 +60,8 @@ def tasks_of(scenario: Scenario, at: References) -> Tasks:
     listed = [task for _, made in of_section for task in made]
     tasks = [*first, *(task for task in avoiding if task not in moved),
              *(task for task in (position, pointing, *listed, posture if last else None) if task)]
+    for wrong in alike(task.name for task in tasks):  # with levels that no section names
+        raise ScenarioError(f"scenario {scenario.name!r}: {wrong}")
     reference = _reference(scenario, at, None if last else posture)
     frozen = scenario.control.stack == "set-based"  # inequalities, which then use no gain or rate
     for task in (*tasks, *((reference,) if reference else ())):

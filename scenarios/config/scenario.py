@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import dataclasses
 import tomllib
-from collections import Counter
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Self
@@ -36,6 +35,7 @@ from scenarios.config.sections.tasks import (
     PointingSection,
     PositionSection,
     PostureSection,
+    alike,
 )
 from scenarios.config.validation import validated
 
@@ -138,11 +138,14 @@ class Scenario(Section):
     def _lists_tasks_apart(self) -> Iterator[str]:
         if self.tasks and self.control.stack == "switched":
             yield '[[tasks]] goes with control.stack = "hierarchical"'
-        names = [task.title.replace(" ", "_") for task in self.tasks]  # as in those of signals
+        names = [task.title for task in self.tasks]
         names += [name for name in ("position", "pointing", "posture") if getattr(self, name)]
-        for name, count in Counter(names).items():
-            if count > 1:
-                yield f"{count} tasks are named {name!r}; give each its own name"
+        yield from alike(names)
+        known = {name.replace(" ", "_") for name in names}
+        for task in self.tasks:
+            turned = f"{task.title} turned"
+            if len(task.shown) > 1 and turned.replace(" ", "_") in known:
+                yield f"task {task.title!r}: another one has the name of its rotation, {turned!r}"
         listed = [task for task in self.tasks if task.kind == "collision"]
         if listed and (self.avoidance is None or self.avoidance.kind != "separation"):
             yield ('a task of kind "collision" needs [avoidance] with kind = '

@@ -100,7 +100,7 @@ class Controller:
         self.sent = sent = self.policy.choose(t, troubles, x, state.v, forces)
         if self.level != "acceleration":
             state.commanded = sent
-        if cell_contacts is not None and self.answered:
+        if cell_contacts is not None and self.resolution.status is not Status.NUMERICAL_FAILURE:
             state.carried = cell_contacts.carried(t, self.resolution.x, state.carried)
         return sent
 

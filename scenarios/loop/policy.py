@@ -27,19 +27,22 @@ class Policy:
     """Chooses the command of each tick.
 
     `clamp` moves a command (n,) to the nearest one that the robot's limits allow in this tick; None
-    for a robot without limits. At level "torque" `torques` returns those, within their limits, of
-    accelerations (n,) and contact forces, None for none. After `choose`: `events` are the (kind,
+    for a robot without limits. `again` does so with one that is sent again, by default `clamp`. At
+    level "torque" `torques` returns those, within their limits, of accelerations (n,) and contact
+    forces, None for none. After `choose`: `events` are the (kind,
     action) pairs of the tick; `slowing` [1/s] is the deceleration per velocity where it brakes,
     else 0; `fault` is the reason for ending the run, once a "stop" was requested, and `stopped` is
     whether the robot has come to rest since then, or at level "torque" is to be left to itself.
     """
 
     def __init__(self, control: ControlSection, clamp: Callable[[Array], Array] | None = None,
-                 torques: Callable[[Array, Array | None], Array] | None = None) -> None:
+                 torques: Callable[[Array, Array | None], Array] | None = None,
+                 again: Callable[[Array], Array] | None = None) -> None:
         self.events: Sequence[tuple[str, str]] = ()
         self.fault: str | None = None
         self.stopped, self.slowing, self._held = False, 0.0, 0
         self._section, self._clamp, self._period = control.policy, clamp, control.period
+        self._again = again or clamp
         self._acceleration, self._torques = control.level == "acceleration", torques
         self._good: Array | None = None
         self._forces: Array | None = None
@@ -61,7 +64,7 @@ class Policy:
         if troubles or self.fault is not None or not finite(x):
             return self._otherwise(t, troubles, x, v)
         self.events, self._held, self._forces = (), 0, forces
-        self._good = command = x if self._clamp is None else self._within_limits(x)
+        self._good = command = x if self._clamp is None else self._within(self._clamp, x)
         return command
 
     def _otherwise(self, t: float, troubles: Sequence[str], x: Array, v: Array) -> Array:
@@ -74,10 +77,10 @@ class Policy:
             action = "brake"
         self.events = [(kind, action) for kind in troubles]
         if action == "use":
-            return self._within_limits(x)
+            return self._within(self._clamp, x)
         if action == "hold" and held is not None:
             self._held += 1
-            return self._within_limits(held)
+            return self._within(self._again, held)
         if action == "stop" and self.fault is None:
             self.fault = f"stopped by its policy at t = {t:.3f} s: {', '.join(troubles)}"
         return self._slower(action, v)
@@ -101,11 +104,11 @@ class Policy:
             self.stopped = bool(np.abs(after).max() <= _AT_REST)
         return command
 
-    def _within_limits(self, x: Array) -> Array:
+    def _within(self, clamp: Callable[[Array], Array] | None, x: Array) -> Array:
         """Return x moved within the limits; a change is an event."""
-        if self._clamp is None:
+        if clamp is None:
             return x
-        command = self._clamp(x)
+        command = clamp(x)
         if _differ(command, x):
             self.events = [*self.events, ("beyond_limits", "clamp")]
         return command
@@ -119,8 +122,9 @@ def policy_of(cell: Cell, control: ControlSection) -> Policy:
     limits, limit = cell.scenario.limits, cell.torque_limit
     step = (limits and limits.torque_step) or inf
     soft = inf if cell.scenario.forces_in_stack else step  # a level of the stack keeps the step
+    clamp = partial(_clamped, cell.state, limit, step)
     return Policy(control, partial(_clamped, cell.state, limit, soft),
-                  _slowed(cell.state, cell.contacts, partial(_clamped, cell.state, limit, step)))
+                  _slowed(cell.state, cell.contacts, clamp), clamp)
 
 
 def _slowed(state: State, contacts: Contacts, clamp: Callable[[Array], Array]

@@ -201,9 +201,11 @@ def measure(recording: Recording, settle: float = 2.0,
         try:
             metrics = list(measures(recording, by))
             expect_each("what it yields", metrics, Metric, "yield these")
+            made = dict(found)
             for metric in metrics:
-                refuse(metric.name in found, f"others yield {metric.name!r} too")
-            found |= {metric.name: metric for metric in metrics}
+                refuse(metric.name in made, f"others yield {metric.name!r} too")
+                made[metric.name] = metric
+            found = made
         except (Exception, SystemExit) as error:  # a user's code, which must not cost the run
             warnings.warn(f"metrics {name!r} are left out: {blamed(error)}", stacklevel=1)
     groups = {group: place for place, group in enumerate(_GROUPS)}

@@ -125,6 +125,12 @@ def test_a_stack_that_asks_for_nothing_is_refused(tmp_path):
     refused("2 tasks are named 'a_b'", load, path, [  # the errors of both would be one signal
         "control.stack=hierarchical",
         "tasks=[{kind='posture', name='a b'}, {kind='com', name='a_b'}]"])
+    # and here one metric, as below
+    refused("task 'a': another one has the name of its rotation, 'a turned'", load, path, [
+        "control.stack=hierarchical",
+        "tasks=[{kind='pose', name='a', frame='tool0'}, {kind='com', name='a turned'}]"])
+    refused("2 tasks are named 'joint_limits'", lambda: build(load("reach-torque", [
+        "tasks.0.name=joint_limits"])), error=ScenarioError)
 
 
 def test_waypoints_of_obstacles_vary_within_their_spread_and_half_the_time_beside_them():

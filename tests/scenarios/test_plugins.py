@@ -273,6 +273,7 @@ def test_arrays_that_a_plugin_keeps_and_overwrites_are_its_own(command, folder):
     ("exit(4)", "metrics 'own' are left out: SystemExit: 4"),
     ("yield Metric('stack_changes', 'S', 77.0, '')", "metrics 'own' are left out: others yield "
      "'stack_changes' too"),
+    ("yield from [Metric('own', 'O', 77.0, '')] * 2", "are left out: others yield 'own' too"),
     ("yield recording['q'].mean()", "what it yields[0]: expected a Metric, got float64")])
 def test_metrics_that_fail_are_left_out_and_the_run_is_kept(body, said, command, folder):
     with_plant(folder, '"odd"')

@@ -75,6 +75,31 @@ def test_an_arm_that_moves_brakes_to_rest_at_its_torque_step(kind):
     assert np.abs(np.diff(run["command"][399:], axis=0)).max() < 1.0 + 1e-9
 
 
+def test_what_is_held_after_braking_is_approached_in_torque_steps():
+    """The torques of before came back at once."""
+    run = simulate(load("stand-push", {
+        "control.duration": 0.12, "limits.torque_step": 0.3, "plant.pushes.0.at": 0.02,
+        "control.policy.stale_after": 0.0, "control.policy.backend_failure": "hold", "faults": [
+            {"kind": "stale", "at": 0.05, "duration": 0.05},
+            {"kind": "status", "status": "backend_failure", "at": 0.1, "duration": 0.005}]}))
+    step = np.abs(np.diff(run["command"], axis=0)).max(axis=1)
+    assert step.max() == pytest.approx(0.3, abs=1e-9)
+    assert (100, "beyond_limits", "clamp") in run.events
+    away = np.abs(run["command"][99:105] - run["command"][49]).max(axis=1)
+    np.testing.assert_allclose(np.diff(away), -0.3, atol=1e-9)
+
+
+def test_a_foot_keeps_its_load_after_a_tick_without_an_answer_before_it_lifts():
+    """The zeros of a failed solve were what it carried, and all of it was dropped at once."""
+    run = simulate(load("step", {
+        "control.duration": 0.2, "contacts.1.open": [[0.3, 0.4]], "faults": [
+            {"kind": "status", "status": "numerical_failure", "at": 0.099, "duration": 0.001}]}))
+    assert run.events == ((99, "numerical_failure", "brake"),)
+    foot = run["planned_force"][:, 4:, 2].sum(axis=1)
+    assert np.isnan(foot[99])
+    np.testing.assert_allclose(foot[[100, 150]] / foot[98], [1.0, 0.75], rtol=1e-6)
+
+
 # Not of robots of packages: the certificate rejects 13 of 150 answers of stand-g1, and 2 of
 # stand-talos, that are right to 1e-14, as a proof in 120 digits shows.
 @pytest.mark.parametrize("name", sorted(

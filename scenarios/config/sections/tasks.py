@@ -5,6 +5,7 @@ Each section of a task makes it; `kinds` has those that only `[[tasks]]` have.
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping
 from math import radians
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal
@@ -29,6 +30,13 @@ Acceleration = Annotated[keys.Positive, keys.Unit("rad/s^2")]
 Rows = Literal["equality", "inequality"]
 Axes = Literal["x", "y", "z", "xy", "xz", "yz", "xyz"]
 JOINT = "joint"  # stands for the unit of joints
+
+
+def alike(names: Iterable[str]) -> Iterator[str]:
+    """Yield what is wrong with names of tasks, of which those of signals and metrics are made."""
+    for name, count in Counter(name.replace(" ", "_") for name in names).items():
+        if count > 1:
+            yield f"{count} tasks are named {name!r}; give each its own name"
 
 
 def shared(units: Iterable[str]) -> str:
