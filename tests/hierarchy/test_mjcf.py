@@ -296,6 +296,7 @@ def test_tendons_that_keep_their_length_couple_their_joints(written):
     ('<connect name="close" site1="a_tip" site2="c_tip"/>', False),
     ('<connect name="close" site1="c_tip" site2="mark"/>', False),
     ('<weld name="close" body1="a" body2="c"/>', True),
+    ('<weld name="close" body1="a" body2="c" torquescale="0"/>', False),
     ('<weld name="close" body1="a" body2="c" anchor=".1 .2 .3" relpose=".1 .3 .2 .5 .5 .5 .5"/>',
      True),
     ('<weld name="close" site1="a_tip" site2="c_tip"/>', True)])
