@@ -221,6 +221,7 @@ class Robot:
         """
         path = file_path("Robot.from_file: path", path)
         _check_base(path, base)
+        expect("Robot.from_file: shapes", shapes, bool, "give True or False")
         found = read_file(path, base, shapes, *_part(locked, root))
         return cls(found.model, Path(path).stem, end_effector, found)
 

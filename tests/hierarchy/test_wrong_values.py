@@ -190,6 +190,7 @@ def limits(**settings):
     (lambda: Robot.load("kuka_lwr", base=B), "base must be one of"),
     (lambda: Robot.named("kuka_lwr", base=B), "robot 'kuka_lwr': base must be one of"),
     (lambda: Robot.from_file(URDF, base="flying"), "iiwa14.urdf': base must be one of"),
+    (lambda: Robot.from_file(URDF, None, None, {"j": 0.1}), "shapes: expected a bool, got dict"),
     (lambda: Robot.from_file(URDF, end_effector=B), "unknown end_effector frame array("),
     (lambda: Frame("tcp", 7, [0, 0, 0.1, 1], A), "'tcp': rotation: expected a rotation matrix"),
     (lambda: Frame("tcp", 7, [0, NAN, 0.1], np.eye(3)), "'tcp': offset: expected 3 finite numb"),
