@@ -139,6 +139,10 @@ class Robot:
         self.actuated = 6 if self.base == "floating" else 0
         self.joint_names: tuple[str, ...] = tuple(model.names)[1:]
         self.parents: tuple[int, ...] = tuple(int(i) for i in model.parents)
+        for last, parent in enumerate(self.parents[1:]):  # else pinocchio's inertia is wrong
+            refuse(parent not in model.supports[last].tolist(), f"robot {name!r}: joint "
+                   f"{self.joint_names[last]!r} hangs on {model.names[parent]!r}, and other "
+                   "branches are between them; give branch after branch", RobotError)
         # pinocchio has huge numbers for "none".
         self.lower, self.upper = (np.where(np.abs(limit) > 1e300, none, limit) for limit, none in (
             (model.lowerPositionLimit, -np.inf), (model.upperPositionLimit, np.inf)))

@@ -264,6 +264,20 @@ def test_a_joint_that_a_table_lacks_is_named(part):
     refused("unknown joint of table 't' 'x'", from_table, table, error=UnknownNameError)
 
 
+def test_joints_that_do_not_come_branch_after_branch_are_refused_by_name():
+    """The entry of the left joint and the hand was zero in the inertia matrix."""
+    chain = [("left", ""), ("right", ""), ("hand", "left")]
+    joints = tuple(TreeJoint(name, parent, (0.3, 0, 0), "z", (-90, 90), 1.0, 1.0,
+                             Link((0.3, 0, 0), 0.02, 1.0)) for name, parent in chain)
+    found = from_table(TreeTable("t", joints, (), "hand"))
+    refused("robot 't': joint 'hand' hangs on 'left', and other branches are between them",
+            Robot, found.model, "t", found=found, error=RobotError)
+    found = from_table(TreeTable("t", joints[::2] + joints[1:2], (), "hand"))
+    state = State.at(Robot(found.model, "t", found=found), (0.1, 0.2, 0.3), (1.0, 2.0, 3.0))
+    energy = pin.computeKineticEnergy(found.model, found.model.createData(), state.q, state.v)
+    assert state.v @ state.mass_matrix() @ state.v / 2 == pytest.approx(energy)
+
+
 @pytest.mark.parametrize("name", TABLES)
 def test_a_shipped_robot_is_the_one_that_recorded_runs_were_made_with(name):
     found, expected = leaves(robot_facts(Robot.named(name))), leaves(read("robots")[name])
