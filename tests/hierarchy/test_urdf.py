@@ -77,11 +77,12 @@ def test_a_planar_joint_moves_in_the_plane_normal_to_its_axis(load, axis):
     q = np.array([0.4, -0.7, np.cos(0.6), np.sin(0.6), 0.2])
     p, turned = motion_of(robot, q, along)
     second = turned * Rotation.from_rotvec([0.0, 0.2, 0.0])
+    held = load(*two_joints("planar", axis, ""), locked={"first": q[:4]})
     for name, place, R in (("base", p, turned), ("first", p, turned),
                            ("arm", p + turned.apply([0.0, 0.0, 0.5]), second)):
-        found = placement(robot, q, name)
-        np.testing.assert_allclose(found[0], ORIGIN[0] + ORIGIN[1].apply(place), atol=1e-12)
-        np.testing.assert_allclose(found[1], (ORIGIN[1] * R).as_matrix(), atol=1e-12)
+        for found in (placement(robot, q, name), placement(held, q[4:], name)):
+            np.testing.assert_allclose(found[0], ORIGIN[0] + ORIGIN[1].apply(place), atol=1e-12)
+            np.testing.assert_allclose(found[1], (ORIGIN[1] * R).as_matrix(), atol=1e-12)
 
 
 def test_masses_and_shapes_on_a_planar_joint_are_where_the_file_has_them(load):
