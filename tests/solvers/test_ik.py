@@ -478,6 +478,17 @@ def test_a_slide_with_one_limit_starts_again_within_it(tmp_path, lower, upper):
     assert lower - 1e-9 <= found.q[0] <= upper + 1e-9
 
 
+@pytest.mark.parametrize("far", [0.5, 70.0, 5000.0])
+def test_a_base_that_floats_goes_as_far_as_it_is_asked_to(far):
+    """Steps of 0.2 m did not take it 70 m, which was said to be unreachable."""
+    robot = Robot.named("quadruped")
+    tip = robot.frame(robot.end_effector)
+    there = State.at(robot, robot.rest).position(tip) + np.array([far, -far, 0.0])
+    found = solve_ik(robot, robot.rest, [Position(tip, Still(there))], until=1e-6)
+    assert (found.verdict, found.starts) == ("reached", 1)
+    np.testing.assert_allclose(State.at(robot, found.q).position(tip), there, atol=1e-6)
+
+
 @pytest.mark.parametrize("far", [1e200, 1e308])
 def test_a_target_beyond_all_numbers_is_unreachable(far):
     hand = Position(FRAME, Still([far, far, 0.0]))
