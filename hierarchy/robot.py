@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
+from operator import attrgetter
 from os import PathLike
 from pathlib import Path
 from typing import Any, get_args
@@ -30,7 +31,7 @@ from hierarchy.errors import (
     refuse,
     whole,
 )
-from hierarchy.gate import array_of, check_rotation
+from hierarchy.gate import array_of, check_rotation, shaped
 from hierarchy.problem import Array
 from hierarchy.records import equal, set_frozen
 from hierarchy.robots import TABLES
@@ -108,6 +109,18 @@ class Body:
     inertia: Array
 
 
+def _sized(name: str, size: str) -> Any:
+    """Return an array (n,) or (nq,) that can be set to numbers of that size alone."""
+    def put(robot: Robot, value: ArrayLike) -> None:
+        what = f"robot {robot.name!r}: {name}"
+        array = shaped(what, value, (getattr(robot, size),))
+        for (i,) in np.argwhere(np.isnan(array))[:1]:
+            raise RobotError(f"{what}[{i}] is nan")
+        setattr(robot, f"_{name}", array)
+
+    return property(attrgetter(f"_{name}"), put)
+
+
 class Robot:
     """A robot: its model, base, limits, frames, control points and capsules of its links.
 
@@ -125,6 +138,12 @@ class Robot:
     pairs of joints whose bodies it lets touch. `table` is the table that the robot was made from,
     or None.
     """
+
+    lower: Array = _sized("lower", "nq")
+    upper: Array = _sized("upper", "nq")
+    velocity_limit: Array = _sized("velocity_limit", "n")
+    effort_limit: Array = _sized("effort_limit", "n")
+    rest: Array = _sized("rest", "nq")
 
     def __init__(self, model: Any, name: str, end_effector: str | None = None,
                  found: Found | None = None) -> None:

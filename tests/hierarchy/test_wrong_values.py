@@ -182,6 +182,10 @@ def limits(**settings):
      "relaxed: level = 1: expected a whole number from 0 to 0"),
     (lambda: Hierarchy.from_levels([(A, B)]).upper_part(2), "2: expected a whole number fr"),
     (lambda: Hierarchy.from_levels([(A, B)]).upper_part(1, (B, B[:1])), "sides has shape (1,), e"),
+    *((partial(setattr, Robot.named("kuka_lwr"), name, value), f"robot 'kuka_lwr': {name}{said}")
+      for name in ("lower", "upper", "velocity_limit", "effort_limit", "rest") for value, said in (
+          (1.0, " has shape (), expected (7,)"), ([1.0], " has shape (1,), expected (7,)"),
+          (None, " is not an array of numbers: NoneType"), ([0.0] * 6 + [NAN], "[6] is nan"))),
     (lambda: Robot.load("kuka_lwr", locked=B), "Robot: locked: expected a Mapping, got ndarray"),
     (lambda: Robot.load("kuka_lwr", root=B), "Robot: root: expected a Sequence, got ndarray"),
     (lambda: ROBOT.difference(np.zeros(7), B), "q: expected 7 finite numbers, got ndarray"),
