@@ -167,6 +167,9 @@ def limits(**settings):
     (lambda: tasks.JointDamping(7, [1.0] * 7), "damping': damping = [1.0, 1.0"),
     (lambda: Stack([tasks.Position(FRAME, THERE, gain=[1.0, 2.0])]).hierarchy(STATE),
      "gain has the shape (2,), expected a number or (3,)"),
+    *((lambda method=method: getattr(tasks.Position(FRAME, THERE, gain=[1.0, 2.0]), method)(STATE),
+       "task 'position': gain has the shape (2,), expected a number or (3,)")
+      for method in ("error", "jacobian", "reference_velocity")),
     (lambda: tasks.CentreOfMass(ROBOT, THERE, 2), "axes: expected finite numbers, got int 2"),
     (lambda: tasks.SelfSeparation(ARM, KEPT, [0, 1]), "pairs have the shape (2,), not (m, 2)"),
     (lambda: tasks.Momentum(target=3), "'momentum': target: expected 6 finite numbers"),
