@@ -11,7 +11,7 @@ from urdf_text import LIMIT, joint, link, placed, urdf
 from hierarchy import Robot, Stack, State
 from hierarchy.errors import RobotError, UnknownNameError
 from hierarchy.robots import TABLES
-from hierarchy.robots.found import Loop
+from hierarchy.robots.found import Coupled, Loop
 from hierarchy.robots.from_table import from_table
 from hierarchy.robots.table import DHTable, Link, TreeFrame, TreeJoint, TreeTable
 from hierarchy.tasks import JointCoupling, JointLimits, Mechanism, Posture, Together, model_rows
@@ -311,6 +311,12 @@ def test_rows_of_a_mechanism_are_derivatives_of_its_error(rigid):
                                atol=1e-8)
     dJ = (task.jacobian(at(h * v)) - task.jacobian(at(-h * v))) / (2 * h)
     np.testing.assert_allclose(task.jacobian_derivative(at(0 * v)), dJ, atol=1e-8)
+
+
+@pytest.mark.parametrize(("coefficients", "said"), [
+    ((1.0, -2.0, 0.0, 0.0, 0.0, 3.0), "3 b^5 - 2 b + 1"), ((0.5,), "0.5"), ((0.0, 0.0), "0")])
+def test_a_coupling_is_written_whatever_its_degree(coefficients, said):
+    assert str(Coupled("a", "b", coefficients)) == f"a = {said} in the file"
 
 
 def planar_bar(rigid, rounding):
