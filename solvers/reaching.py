@@ -269,9 +269,11 @@ class _Search:
         asked = h.slacks(np.zeros(h.n))[rows]
         pull = h.A[rows].T @ asked
         held = [*self._limits_at(-pull), *_above(h, k, -pull, self.limits)]
+        nearest = "it is as near as the robot comes" if self.settled.strict else (
+            f"{self.settled.label} is not strict, and may trade it for other tasks")
         said = nowhere(h, k, self.stack[task.name].row_names, np.zeros(h.n))
         by = f", held back by {listed(held)}" if held else f": {said}" if said else (
-            ": it is as near as the robot comes" if asked.any() else
+            f": {nearest}" if asked.any() else
             f": its rows ask for no velocity, its gain is {task.gain:g}")
         return (f"unreachable: nearest found, {task.name} is missed by "
                 f"{errors[task.name]:.3g}{by}")

@@ -351,6 +351,9 @@ def test_what_holds_a_target_out_of_reach_back_is_said():
              Position(FRAME, Still(here)), Position(FRAME, Still(here + 0.1), name="other")]
     assert "other is missed by 0.173, held back by position" in solve_ik(
         ROBOT, Q, tasks, until=1e-6).verdict
+    found = solve_ik(ROBOT, Q, [tasks[2], Posture(tuple(Q))], resolver="augmented", limits=False,
+                     until=1e-6)
+    assert found.verdict.endswith("augmented is not strict, and may trade it for other tasks")
     here[0] = np.nan  # it raised StopIteration
     with pytest.raises(HierarchyError, match=r"task 'position': its error is not finite: \[nan"):
         solve_ik(ROBOT, Q, tasks[1:2], until=1e-6)
