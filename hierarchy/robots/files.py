@@ -9,6 +9,7 @@ from copy import deepcopy
 from dataclasses import replace
 from pathlib import Path
 from tempfile import TemporaryFile
+from threading import Lock
 from types import MappingProxyType
 from typing import Any
 from xml.etree import ElementTree
@@ -82,20 +83,24 @@ def _read_urdf(path: Path, root: Element, base: Base | None, shapes: bool,
     return replace(robot, capsules=kept, missing=(*missing, *left_out, *robot.missing))
 
 
+_READING = Lock()
+
+
 @contextmanager
 def _printed() -> Iterator[Callable[[], list[str]]]:
     """Capture what parsers print on standard error; yield a function that returns its lines.
 
-    Lines that name the parser's source files are left out.
+    Lines that name the parser's source files are left out. Other threads wait: the process has one
+    standard error, which they would put back in another order.
     """
-    sys.stderr.flush()
-    kept = os.dup(2)
-    with TemporaryFile("w+", errors="replace") as file:
+    with _READING, TemporaryFile("w+", errors="replace") as file:
         def lines() -> list[str]:
             file.seek(0)
             return [re.sub(r"^(Error|Warning):\s*", "", line.strip()) for line in file
                     if line.strip() and not line.strip().startswith("at line ")]
 
+        sys.stderr.flush()
+        kept = os.dup(2)
         os.dup2(file.fileno(), 2)
         try:
             yield lines

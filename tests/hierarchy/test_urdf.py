@@ -1,5 +1,8 @@
 """URDF files as users have them: what they mean is read, and what is lost is said."""
 
+import os
+from concurrent.futures import ThreadPoolExecutor
+
 import numpy as np
 import pytest
 from refusals import refused
@@ -132,6 +135,14 @@ def test_what_a_robot_is_without_is_said(load, changed, said):
                  joint("only", given["kind"], "base", "arm", given["limit"], given["axis"]),
                  given["more"], root=f'<robot name="r"{given["root"]}>')
     assert [sentence for sentence in robot.missing if said in sentence], robot.missing
+
+
+def test_threads_that_read_files_leave_the_standard_error_where_it_was(load):
+    before, parts = os.fstat(2), (link("a"), link("b"), joint("j", "revolute", "a", "b"))
+    with ThreadPoolExecutor(8) as threads:
+        found = list(threads.map(lambda i: load(*parts, name=f"{i}.urdf").missing, range(200)))
+    assert os.path.samestat(os.fstat(2), before)
+    assert found == 200 * [()]
 
 
 def test_what_the_parser_refuses_and_can_only_mean_one_thing_is_read(load):
