@@ -9,7 +9,6 @@ from copy import deepcopy
 from dataclasses import replace
 from pathlib import Path
 from tempfile import TemporaryFile
-from threading import Lock
 from types import MappingProxyType
 from typing import Any
 from xml.etree import ElementTree
@@ -17,7 +16,7 @@ from xml.etree import ElementTree
 import numpy as np
 from numpy.typing import ArrayLike
 
-from hierarchy.errors import RobotError
+from hierarchy.errors import OF_PROCESS, RobotError
 from hierarchy.robots import found, mjcf, urdf
 from hierarchy.robots.found import Found, is_floating, neutral_within_limits
 from hierarchy.robots.from_table import ROOT
@@ -83,9 +82,6 @@ def _read_urdf(path: Path, root: Element, base: Base | None, shapes: bool,
     return replace(robot, capsules=kept, missing=(*missing, *left_out, *robot.missing))
 
 
-_READING = Lock()
-
-
 @contextmanager
 def _printed() -> Iterator[Callable[[], list[str]]]:
     """Capture what parsers print on standard error; yield a function that returns its lines.
@@ -93,7 +89,7 @@ def _printed() -> Iterator[Callable[[], list[str]]]:
     Lines that name the parser's source files are left out. Other threads wait: the process has one
     standard error, which they would put back in another order.
     """
-    with _READING, TemporaryFile("w+", errors="replace") as file:
+    with OF_PROCESS, TemporaryFile("w+", errors="replace") as file:
         def lines() -> list[str]:
             file.seek(0)
             return [re.sub(r"^(Error|Warning):\s*", "", line.strip()) for line in file
