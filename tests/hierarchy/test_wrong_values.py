@@ -361,6 +361,11 @@ def limits(**settings):
        f"{task.name!r}: the reference of a stack has a row for each joint")
       for task in (tasks.Position(FRAME, THERE), LIMITS, tasks.JointCoupling(
           ROBOT, {"joint_7": 1.0}))),
+    *((lambda wrong=wrong: Given(wrong).error_reader(STATE)(), f"task 'given': error {said}")
+      for wrong, said in ((None, "is not an array of numbers"), ("x", "is not an array of numb"),
+                          ([1.0], "has shape (1,), expected (2,)"))),
+    (lambda: Stack([type("Nameless", (Kernel,), {"name": None})(abs)]),
+     "Nameless: name: expected a str, got NoneType None"),
     *((lambda wrong=wrong: Stack([Given(**wrong)], "velocity").hierarchy(STATE), said)
       for wrong, said in (({"wrong": [1.0, 2.0, 3.0]}, "'given': error has shape (3,), expec"),
                           ({"wrong": [0.0, NAN]}, "task 'given', row 1: lower is nan"),
