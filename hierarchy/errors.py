@@ -8,6 +8,7 @@ from errno import ENAMETOOLONG
 from math import inf, isfinite, isnan, nan
 from numbers import Integral, Real
 from pathlib import Path
+from threading import Lock
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,6 +16,7 @@ from numpy.typing import NDArray
 _NEAR = 0.6   # similarity of two names, 0 to 1, from which one is suggested
 _LARGEST = 2**31 - 1  # whole number, where no other is said
 SEEDS = 2**63 - 1     # largest seed of random numbers
+OF_PROCESS = Lock()   # held while its filters of warnings, or its standard error, are others
 _LISTED = 15  # known names that a message lists; of more it has the nearest
 
 

@@ -19,7 +19,7 @@ from hierarchy.kinematics import Kinematics
 from hierarchy.paths import Path
 from hierarchy.problem import Array
 from hierarchy.state import State
-from hierarchy.task import Level, Rows, Task, Writer, derivative
+from hierarchy.task import Level, Rows, Task, Writer, check_gains, derivative
 
 Measure = tuple[Kernel, Any]  # the function, and what it reads; see `Measured.measure`
 _NONE, _EXACT, _DIFFERENCE = 0, 1, 2  # the derivative of the Jacobian
@@ -150,9 +150,13 @@ class Measured(Task):
             self.refuse(True, f"measure returned {brief(found)}; expected a function under "
                         "@measured or @plain, and a tuple of what it reads")
         settings, width = np.empty((5, m)), np.inf if self.kind == "inequality" else 0.0
-        for row, value in zip(settings, (self.stiffness, self.damping, self.gain, width,
-                                         self.columns), strict=True):
-            row[:] = np.asarray(value)
+        try:
+            for row, value in zip(settings, (self.stiffness, self.damping, self.gain, width,
+                                             self.columns), strict=True):
+                row[:] = np.asarray(value)
+        except ValueError:  # to look first takes longer than the rest
+            check_gains(self, m)
+            raise
         derivative = (_NONE if level == "velocity" else
                       _EXACT if self.exact or state.period == 0.0 else _DIFFERENCE)
         goal = np.zeros((3, 1 + int(max([2.0, *settings[4].tolist()]))))

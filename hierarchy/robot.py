@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
+from operator import attrgetter
 from os import PathLike
 from pathlib import Path
 from typing import Any, get_args
@@ -30,7 +31,7 @@ from hierarchy.errors import (
     refuse,
     whole,
 )
-from hierarchy.gate import array_of, check_rotation
+from hierarchy.gate import array_of, check_rotation, shaped
 from hierarchy.problem import Array
 from hierarchy.records import equal, set_frozen
 from hierarchy.robots import TABLES
@@ -108,6 +109,18 @@ class Body:
     inertia: Array
 
 
+def _sized(name: str, size: str) -> Any:
+    """Return an array (n,) or (nq,) that can be set to numbers of that size alone."""
+    def put(robot: Robot, value: ArrayLike) -> None:
+        what = f"robot {robot.name!r}: {name}"
+        array = shaped(what, value, (getattr(robot, size),))
+        for (i,) in np.argwhere(np.isnan(array))[:1]:
+            raise RobotError(f"{what}[{i}] is nan")
+        setattr(robot, f"_{name}", array)
+
+    return property(attrgetter(f"_{name}"), put)
+
+
 class Robot:
     """A robot: its model, base, limits, frames, control points and capsules of its links.
 
@@ -126,6 +139,12 @@ class Robot:
     or None.
     """
 
+    lower: Array = _sized("lower", "nq")
+    upper: Array = _sized("upper", "nq")
+    velocity_limit: Array = _sized("velocity_limit", "n")
+    effort_limit: Array = _sized("effort_limit", "n")
+    rest: Array = _sized("rest", "nq")
+
     def __init__(self, model: Any, name: str, end_effector: str | None = None,
                  found: Found | None = None) -> None:
         expect("Robot: model", model, pin.Model, "Robot.load makes a robot of a name or a file")
@@ -139,6 +158,10 @@ class Robot:
         self.actuated = 6 if self.base == "floating" else 0
         self.joint_names: tuple[str, ...] = tuple(model.names)[1:]
         self.parents: tuple[int, ...] = tuple(int(i) for i in model.parents)
+        for last, parent in enumerate(self.parents[1:]):  # else pinocchio's inertia is wrong
+            refuse(parent not in model.supports[last].tolist(), f"robot {name!r}: joint "
+                   f"{self.joint_names[last]!r} hangs on {model.names[parent]!r}, and other "
+                   "branches are between them; give branch after branch", RobotError)
         # pinocchio has huge numbers for "none".
         self.lower, self.upper = (np.where(np.abs(limit) > 1e300, none, limit) for limit, none in (
             (model.lowerPositionLimit, -np.inf), (model.upperPositionLimit, np.inf)))
@@ -221,6 +244,7 @@ class Robot:
         """
         path = file_path("Robot.from_file: path", path)
         _check_base(path, base)
+        expect("Robot.from_file: shapes", shapes, bool, "give True or False")
         found = read_file(path, base, shapes, *_part(locked, root))
         return cls(found.model, Path(path).stem, end_effector, found)
 

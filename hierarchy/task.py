@@ -149,7 +149,7 @@ class Task(ABC):
 
     def error_reader(self, state: State) -> Callable[[], Array]:
         """Return a function that returns the error at a state as it is when called."""
-        return lambda: self.error(state)
+        return lambda: self._row("error", self.error(state))
 
     @abstractmethod
     def jacobian(self, state: State) -> Array:

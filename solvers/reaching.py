@@ -27,6 +27,7 @@ from solvers.status import Status
 _STARTS, _MOST = 20, 200  # starts, and iterations of each
 _PERIOD = 0.1     # [s] for which the velocity of a step is held
 _STEP = 0.3       # [rad or m] the largest change of a joint in one iteration
+_SHARE = 0.1      # of the errors, in m: that of a joint that slides, where it is more
 _STILL = 1e-3     # relative decrease of the errors in `_PATIENCE` iterations that goes on
 _AT_REST = 1e-9   # the same at the end
 _PATIENCE = 10
@@ -63,13 +64,13 @@ def reach(robot: Robot, q: ArrayLike, tasks: Sequence[Task], until: float, *, li
           resolver: Resolver, t: float = 0.0, damping: float = 1.0) -> Reached:
     """Return the configuration near q in which the tasks are met, in strict order, at time t.
 
-    Gauss-Newton steps of the same problem as `solve_ik`, each at most 0.3 rad or m, for the whole
-    error of each task whatever its gain. Where the errors stop falling, they start again from a
-    random configuration within the limits, the same ones in each call. These steps are undamped,
-    which finds more; from the end of the first start, and of the best, damped ones go on to the
-    nearest, and the latter is the answer where it is nearer by `until`. Joint tasks such as a
-    posture are preferences: they do not decide whether the others are met, but where; their gains
-    count relative to the largest of all.
+    Gauss-Newton steps of the same problem as `solve_ik`, each at most 0.3 rad, and 0.3 m or a tenth
+    of the errors, for the whole error of each task whatever its gain. Where the errors stop
+    falling, they start again from a random configuration within the limits, the same ones in each
+    call. These steps are undamped, which finds more; from the end of the first start, and of the
+    best, damped ones go on to the nearest, and the latter is the answer where it is nearer by
+    `until`. Joint tasks such as a posture are preferences: they do not decide whether the others
+    are met, but where; their gains count relative to the largest of all.
 
     until : largest norm of the error of each task that decides, in its unit.
 
@@ -150,9 +151,10 @@ class _Search:
                  resolver: Resolver, damping: float) -> None:
         robot, fastest = state.robot, max([1e-3, *map(_fastest, tasks)])
         self.robot, self.until, self.t, self.tasks = robot, until, state.t, list(tasks)
-        quick = copy(robot)  # a configuration has no speed: slow joints go at 1 rad/s or m/s
-        quick.velocity_limit = np.where(robot.velocity_limit > 0.0, np.maximum(
-            robot.velocity_limit, 1.0), 0.0)
+        self.slides = np.array([unit == "m" for unit in robot.velocity_units])
+        quick = copy(robot)  # a configuration has no speed: slow joints turn at 1 rad/s
+        quick.velocity_limit = np.where(robot.velocity_limit > 0.0, np.where(
+            self.slides, np.inf, np.maximum(robot.velocity_limit, 1.0)), 0.0)
         self.limits = [StepLimits(quick, _PERIOD, 1.0 / _PERIOD)] if limits else []
         free: Array = np.full(robot.n, np.inf)
         self.lower, self.upper = robot.position_limits() if limits else (-free, free)
@@ -200,11 +202,15 @@ class _Search:
                 return (errors, q, k) if done else (*best, k)
             found = resolver.solve(self._rows(), memory)
             self.status, memory = found.status, found.memory
-            step, longest = found.x * _PERIOD, _STEP * shrink**k
-            moved = min(longest, abs(step).max())
-            q = self.mechanism.closed(self.robot.integrate(
-                q, step * min(1.0, longest / max(abs(step).max(), 1e-300))))
+            step = self._shortened(found.x * _PERIOD, max(errors), shrink**k)
+            moved = abs(step).max()
+            q = self.mechanism.closed(self.robot.integrate(q, step))
         return (*best, _MOST)
+
+    def _shortened(self, step: Array, error: float, share: float) -> Array:
+        """Return a step along another (n,), no longer than a share of what the errors allow."""
+        longest = np.where(self.slides, max(_STEP, _SHARE * error), _STEP) * share
+        return np.asarray(step / max(1.0, (np.abs(step) / longest).max()))
 
     def _rows(self) -> Hierarchy:
         """Return the problem of a step as if targets stood still, for t does."""
@@ -263,9 +269,11 @@ class _Search:
         asked = h.slacks(np.zeros(h.n))[rows]
         pull = h.A[rows].T @ asked
         held = [*self._limits_at(-pull), *_above(h, k, -pull, self.limits)]
+        nearest = "it is as near as the robot comes" if self.settled.strict else (
+            f"{self.settled.label} is not strict, and may trade it for other tasks")
         said = nowhere(h, k, self.stack[task.name].row_names, np.zeros(h.n))
         by = f", held back by {listed(held)}" if held else f": {said}" if said else (
-            ": it is as near as the robot comes" if asked.any() else
+            f": {nearest}" if asked.any() else
             f": its rows ask for no velocity, its gain is {task.gain:g}")
         return (f"unreachable: nearest found, {task.name} is missed by "
                 f"{errors[task.name]:.3g}{by}")

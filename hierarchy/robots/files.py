@@ -16,7 +16,7 @@ from xml.etree import ElementTree
 import numpy as np
 from numpy.typing import ArrayLike
 
-from hierarchy.errors import RobotError
+from hierarchy.errors import OF_PROCESS, RobotError
 from hierarchy.robots import found, mjcf, urdf
 from hierarchy.robots.found import Found, is_floating, neutral_within_limits
 from hierarchy.robots.from_table import ROOT
@@ -86,16 +86,17 @@ def _read_urdf(path: Path, root: Element, base: Base | None, shapes: bool,
 def _printed() -> Iterator[Callable[[], list[str]]]:
     """Capture what parsers print on standard error; yield a function that returns its lines.
 
-    Lines that name the parser's source files are left out.
+    Lines that name the parser's source files are left out. Other threads wait: the process has one
+    standard error, which they would put back in another order.
     """
-    sys.stderr.flush()
-    kept = os.dup(2)
-    with TemporaryFile("w+", errors="replace") as file:
+    with OF_PROCESS, TemporaryFile("w+", errors="replace") as file:
         def lines() -> list[str]:
             file.seek(0)
             return [re.sub(r"^(Error|Warning):\s*", "", line.strip()) for line in file
                     if line.strip() and not line.strip().startswith("at line ")]
 
+        sys.stderr.flush()
+        kept = os.dup(2)
         os.dup2(file.fileno(), 2)
         try:
             yield lines

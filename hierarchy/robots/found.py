@@ -41,11 +41,10 @@ class Coupled:
         return float(powers @ self.coefficients)
 
     def __str__(self) -> str:
-        powers = ["", f" {self.other}", *(f" {self.other}^{i}" for i in range(2, 5))]
-        terms = [f"{value:g}{power}" for value, power
-                 in zip(self.coefficients[::-1], powers[len(self.coefficients) - 1::-1],
-                        strict=True) if value != 0.0]
-        return f"{self.joint} = {' + '.join(terms) or '0'} in the file".replace("+ -", "- ")
+        powers = {0: "", 1: f" {self.other}"}
+        terms = [f"{value:g}{powers.get(i, f' {self.other}^{i}')}"
+                 for i, value in enumerate(self.coefficients) if value != 0.0]
+        return f"{self.joint} = {' + '.join(terms[::-1]) or '0'} in the file".replace("+ -", "- ")
 
 
 @dataclass(frozen=True)

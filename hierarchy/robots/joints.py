@@ -165,12 +165,15 @@ def held(model: Any, joints: list[int], q: Array) -> Any:
     """Return a model whose `joints` are held at q (nq,).
 
     pinocchio refers to frames by name, and a link may have the name of a joint. Meanwhile it has
-    one that no file can give.
+    one that no file can give. The frame of a joint may be turned in it, as that of a planar one.
     """
+    places = {frame.name: pin.SE3(frame.placement) for frame in model.frames
+              if frame.type == pin.FrameType.JOINT and frame.parentJoint in joints}
     links = [frame for frame in model.frames if frame.type == pin.FrameType.BODY]
     for frame in links:
         frame.name = f"\n{frame.name}"
     found = pin.buildReducedModel(model, joints, q)
     for frame in found.frames:
+        frame.placement = frame.placement * places.get(frame.name, pin.SE3.Identity())
         frame.name = frame.name.removeprefix("\n")
     return found

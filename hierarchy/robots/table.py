@@ -129,7 +129,7 @@ class TreeFrame:
 
 @dataclass(frozen=True)
 class TreeTable:
-    """A robot with a tree of revolute joints; parents come before their children.
+    """A robot with a tree of revolute joints: right after each come all that hang on it.
 
     `base` "floating" gives it six more velocities, those of the base's own frame, which is at
     `base_height` [m] above the world's origin at the start. `links` are further shapes as (joint,

@@ -148,6 +148,12 @@ def _complaints(root: Element) -> Iterator[str]:
         yield "its <robot> has no name"
     if not links:
         yield "it has no link"
+    if root.get("version", "1.0") == "1.0":
+        yield from (f"{part.tag} {name_of(part)!r}: its quat_xyzw is ignored before "
+                    '<robot version="1.1">; give rpy'
+                    for part in (*root.findall("joint"), *root.findall("link"))
+                    for path in ("origin", "inertial/origin", "collision/origin")
+                    for origin in part.findall(path) if origin.get("quat_xyzw"))
     kinds = {name_of(joint): joint.get("type") for joint in root.findall("joint")}
     for joint in root.findall("joint"):
         name = f"joint {name_of(joint)!r}"

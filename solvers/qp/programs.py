@@ -4,14 +4,13 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Mapping
-from threading import Lock
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from numpy.linalg import norm
 from numpy.typing import ArrayLike
 
-from hierarchy.errors import HierarchyError, expect, refuse, whole
+from hierarchy.errors import OF_PROCESS, HierarchyError, expect, refuse, whole
 from hierarchy.gate import array_of, sound_rows
 from hierarchy.problem import Array, Hierarchy
 from solvers.qp.backends import Backend
@@ -23,7 +22,6 @@ if TYPE_CHECKING:
 
 _RANK, _SETTLED = 1e-8, 1e-7  # of `level_problem`: rank tolerance, and miss of a row that is kept
 _FAR = 1e6  # sizes of y beyond which proxqp does not come back from a guess, in seconds
-_WARNINGS = Lock()  # their filters belong to the process: threads would restore each other's
 
 
 class Program(NamedTuple):
@@ -55,7 +53,7 @@ class Program(NamedTuple):
         """Return what `solve` does, of this program as it is."""
         import qpsolvers
 
-        with _WARNINGS, warnings.catch_warnings():
+        with OF_PROCESS, warnings.catch_warnings():
             warnings.simplefilter("ignore")  # the backend's status says the same
             try:
                 solution = qpsolvers.solve_problem(

@@ -11,7 +11,7 @@ from urdf_text import LIMIT, joint, link, placed, urdf
 from hierarchy import Robot, Stack, State
 from hierarchy.errors import RobotError, UnknownNameError
 from hierarchy.robots import TABLES
-from hierarchy.robots.found import Loop
+from hierarchy.robots.found import Coupled, Loop
 from hierarchy.robots.from_table import from_table
 from hierarchy.robots.table import DHTable, Link, TreeFrame, TreeJoint, TreeTable
 from hierarchy.tasks import JointCoupling, JointLimits, Mechanism, Posture, Together, model_rows
@@ -264,6 +264,20 @@ def test_a_joint_that_a_table_lacks_is_named(part):
     refused("unknown joint of table 't' 'x'", from_table, table, error=UnknownNameError)
 
 
+def test_joints_that_do_not_come_branch_after_branch_are_refused_by_name():
+    """The entry of the left joint and the hand was zero in the inertia matrix."""
+    chain = [("left", ""), ("right", ""), ("hand", "left")]
+    joints = tuple(TreeJoint(name, parent, (0.3, 0, 0), "z", (-90, 90), 1.0, 1.0,
+                             Link((0.3, 0, 0), 0.02, 1.0)) for name, parent in chain)
+    found = from_table(TreeTable("t", joints, (), "hand"))
+    refused("robot 't': joint 'hand' hangs on 'left', and other branches are between them",
+            Robot, found.model, "t", found=found, error=RobotError)
+    found = from_table(TreeTable("t", joints[::2] + joints[1:2], (), "hand"))
+    state = State.at(Robot(found.model, "t", found=found), (0.1, 0.2, 0.3), (1.0, 2.0, 3.0))
+    energy = pin.computeKineticEnergy(found.model, found.model.createData(), state.q, state.v)
+    assert state.v @ state.mass_matrix() @ state.v / 2 == pytest.approx(energy)
+
+
 @pytest.mark.parametrize("name", TABLES)
 def test_a_shipped_robot_is_the_one_that_recorded_runs_were_made_with(name):
     found, expected = leaves(robot_facts(Robot.named(name))), leaves(read("robots")[name])
@@ -297,6 +311,12 @@ def test_rows_of_a_mechanism_are_derivatives_of_its_error(rigid):
                                atol=1e-8)
     dJ = (task.jacobian(at(h * v)) - task.jacobian(at(-h * v))) / (2 * h)
     np.testing.assert_allclose(task.jacobian_derivative(at(0 * v)), dJ, atol=1e-8)
+
+
+@pytest.mark.parametrize(("coefficients", "said"), [
+    ((1.0, -2.0, 0.0, 0.0, 0.0, 3.0), "3 b^5 - 2 b + 1"), ((0.5,), "0.5"), ((0.0, 0.0), "0")])
+def test_a_coupling_is_written_whatever_its_degree(coefficients, said):
+    assert str(Coupled("a", "b", coefficients)) == f"a = {said} in the file"
 
 
 def planar_bar(rigid, rounding):

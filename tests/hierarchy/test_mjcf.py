@@ -1,6 +1,8 @@
 """Robots of MJCF files are what MuJoCo says they are; MuJoCo itself is asked."""
 
 import sys
+import warnings
+from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 import pytest
@@ -109,6 +111,13 @@ def test_without_mujoco_the_extra_is_named(written, monkeypatch):
     monkeypatch.setitem(sys.modules, "mujoco", None)
     path = written(world(link("a")))
     refused("pip install 'task-hierarchy[sim]'", Robot.load, path, error=RobotError)
+
+
+def test_threads_that_read_files_leave_the_filters_of_warnings_as_they_were(written):
+    path, before = written(world(link("a"))), (list(warnings.filters), warnings.showwarning)
+    with ThreadPoolExecutor(8) as threads:
+        assert {robot.n for robot in threads.map(Robot.load, 100 * [path])} == {1}
+    assert (warnings.filters, warnings.showwarning) == before
 
 
 def test_a_scene_is_one_robot_unless_a_root_is_named(written):
@@ -296,6 +305,7 @@ def test_tendons_that_keep_their_length_couple_their_joints(written):
     ('<connect name="close" site1="a_tip" site2="c_tip"/>', False),
     ('<connect name="close" site1="c_tip" site2="mark"/>', False),
     ('<weld name="close" body1="a" body2="c"/>', True),
+    ('<weld name="close" body1="a" body2="c" torquescale="0"/>', False),
     ('<weld name="close" body1="a" body2="c" anchor=".1 .2 .3" relpose=".1 .3 .2 .5 .5 .5 .5"/>',
      True),
     ('<weld name="close" site1="a_tip" site2="c_tip"/>', True)])

@@ -151,6 +151,8 @@ WRONG = [
     ({"link": '<inertial><mass value="-1"/></inertial>'}, "link 'upper': its mass '-1'"),
     ({"link": '<inertial><origin xyz="0 1e160 0"/></inertial>'},
      "link 'upper': its origin xyz = '0 1e160 0' is larger than 1e.50"),
+    ({"link": '<collision><origin quat_xyzw="1 0 0 1"/></collision>'},
+     "link 'upper': its quat_xyzw is ignored before <robot version=\"1.1\">; give rpy"),
     ({"link": '<inertial><inertia ixx="-1e308"/></inertial>'}, "its inertia ixx = '-1e308' is"),
     ({"mimic": '<mimic joint="shoulder" offset="1e308"/>'}, "'elbow': its mimic offset = '1e308'"),
     ({"kind": "revolut"}, "joint 'shoulder': its type is 'revolut'"),

@@ -1,5 +1,8 @@
 """URDF files as users have them: what they mean is read, and what is lost is said."""
 
+import os
+from concurrent.futures import ThreadPoolExecutor
+
 import numpy as np
 import pytest
 from refusals import refused
@@ -77,11 +80,12 @@ def test_a_planar_joint_moves_in_the_plane_normal_to_its_axis(load, axis):
     q = np.array([0.4, -0.7, np.cos(0.6), np.sin(0.6), 0.2])
     p, turned = motion_of(robot, q, along)
     second = turned * Rotation.from_rotvec([0.0, 0.2, 0.0])
+    held = load(*two_joints("planar", axis, ""), locked={"first": q[:4]})
     for name, place, R in (("base", p, turned), ("first", p, turned),
                            ("arm", p + turned.apply([0.0, 0.0, 0.5]), second)):
-        found = placement(robot, q, name)
-        np.testing.assert_allclose(found[0], ORIGIN[0] + ORIGIN[1].apply(place), atol=1e-12)
-        np.testing.assert_allclose(found[1], (ORIGIN[1] * R).as_matrix(), atol=1e-12)
+        for found in (placement(robot, q, name), placement(held, q[4:], name)):
+            np.testing.assert_allclose(found[0], ORIGIN[0] + ORIGIN[1].apply(place), atol=1e-12)
+            np.testing.assert_allclose(found[1], (ORIGIN[1] * R).as_matrix(), atol=1e-12)
 
 
 def test_masses_and_shapes_on_a_planar_joint_are_where_the_file_has_them(load):
@@ -131,6 +135,14 @@ def test_what_a_robot_is_without_is_said(load, changed, said):
                  joint("only", given["kind"], "base", "arm", given["limit"], given["axis"]),
                  given["more"], root=f'<robot name="r"{given["root"]}>')
     assert [sentence for sentence in robot.missing if said in sentence], robot.missing
+
+
+def test_threads_that_read_files_leave_the_standard_error_where_it_was(load):
+    before, parts = os.fstat(2), (link("a"), link("b"), joint("j", "revolute", "a", "b"))
+    with ThreadPoolExecutor(8) as threads:
+        found = list(threads.map(lambda i: load(*parts, name=f"{i}.urdf").missing, range(200)))
+    assert os.path.samestat(os.fstat(2), before)
+    assert found == 200 * [()]
 
 
 def test_what_the_parser_refuses_and_can_only_mean_one_thing_is_read(load):

@@ -167,6 +167,9 @@ def limits(**settings):
     (lambda: tasks.JointDamping(7, [1.0] * 7), "damping': damping = [1.0, 1.0"),
     (lambda: Stack([tasks.Position(FRAME, THERE, gain=[1.0, 2.0])]).hierarchy(STATE),
      "gain has the shape (2,), expected a number or (3,)"),
+    *((lambda method=method: getattr(tasks.Position(FRAME, THERE, gain=[1.0, 2.0]), method)(STATE),
+       "task 'position': gain has the shape (2,), expected a number or (3,)")
+      for method in ("error", "jacobian", "reference_velocity")),
     (lambda: tasks.CentreOfMass(ROBOT, THERE, 2), "axes: expected finite numbers, got int 2"),
     (lambda: tasks.SelfSeparation(ARM, KEPT, [0, 1]), "pairs have the shape (2,), not (m, 2)"),
     (lambda: tasks.Momentum(target=3), "'momentum': target: expected 6 finite numbers"),
@@ -182,6 +185,10 @@ def limits(**settings):
      "relaxed: level = 1: expected a whole number from 0 to 0"),
     (lambda: Hierarchy.from_levels([(A, B)]).upper_part(2), "2: expected a whole number fr"),
     (lambda: Hierarchy.from_levels([(A, B)]).upper_part(1, (B, B[:1])), "sides has shape (1,), e"),
+    *((partial(setattr, Robot.named("kuka_lwr"), name, value), f"robot 'kuka_lwr': {name}{said}")
+      for name in ("lower", "upper", "velocity_limit", "effort_limit", "rest") for value, said in (
+          (1.0, " has shape (), expected (7,)"), ([1.0], " has shape (1,), expected (7,)"),
+          (None, " is not an array of numbers: NoneType"), ([0.0] * 6 + [NAN], "[6] is nan"))),
     (lambda: Robot.load("kuka_lwr", locked=B), "Robot: locked: expected a Mapping, got ndarray"),
     (lambda: Robot.load("kuka_lwr", root=B), "Robot: root: expected a Sequence, got ndarray"),
     (lambda: ROBOT.difference(np.zeros(7), B), "q: expected 7 finite numbers, got ndarray"),
@@ -190,6 +197,7 @@ def limits(**settings):
     (lambda: Robot.load("kuka_lwr", base=B), "base must be one of"),
     (lambda: Robot.named("kuka_lwr", base=B), "robot 'kuka_lwr': base must be one of"),
     (lambda: Robot.from_file(URDF, base="flying"), "iiwa14.urdf': base must be one of"),
+    (lambda: Robot.from_file(URDF, None, None, {"j": 0.1}), "shapes: expected a bool, got dict"),
     (lambda: Robot.from_file(URDF, end_effector=B), "unknown end_effector frame array("),
     (lambda: Frame("tcp", 7, [0, 0, 0.1, 1], A), "'tcp': rotation: expected a rotation matrix"),
     (lambda: Frame("tcp", 7, [0, NAN, 0.1], np.eye(3)), "'tcp': offset: expected 3 finite numb"),
@@ -353,6 +361,11 @@ def limits(**settings):
        f"{task.name!r}: the reference of a stack has a row for each joint")
       for task in (tasks.Position(FRAME, THERE), LIMITS, tasks.JointCoupling(
           ROBOT, {"joint_7": 1.0}))),
+    *((lambda wrong=wrong: Given(wrong).error_reader(STATE)(), f"task 'given': error {said}")
+      for wrong, said in ((None, "is not an array of numbers"), ("x", "is not an array of numb"),
+                          ([1.0], "has shape (1,), expected (2,)"))),
+    (lambda: Stack([type("Nameless", (Kernel,), {"name": None})(abs)]),
+     "Nameless: name: expected a str, got NoneType None"),
     *((lambda wrong=wrong: Stack([Given(**wrong)], "velocity").hierarchy(STATE), said)
       for wrong, said in (({"wrong": [1.0, 2.0, 3.0]}, "'given': error has shape (3,), expec"),
                           ({"wrong": [0.0, NAN]}, "task 'given', row 1: lower is nan"),

@@ -351,6 +351,9 @@ def test_what_holds_a_target_out_of_reach_back_is_said():
              Position(FRAME, Still(here)), Position(FRAME, Still(here + 0.1), name="other")]
     assert "other is missed by 0.173, held back by position" in solve_ik(
         ROBOT, Q, tasks, until=1e-6).verdict
+    found = solve_ik(ROBOT, Q, [tasks[2], Posture(tuple(Q))], resolver="augmented", limits=False,
+                     until=1e-6)
+    assert found.verdict.endswith("augmented is not strict, and may trade it for other tasks")
     here[0] = np.nan  # it raised StopIteration
     with pytest.raises(HierarchyError, match=r"task 'position': its error is not finite: \[nan"):
         solve_ik(ROBOT, Q, tasks[1:2], until=1e-6)
@@ -476,6 +479,17 @@ def test_a_slide_with_one_limit_starts_again_within_it(tmp_path, lower, upper):
                      until=1e-6)
     assert (found.met, found.starts) == (False, 20)
     assert lower - 1e-9 <= found.q[0] <= upper + 1e-9
+
+
+@pytest.mark.parametrize("far", [0.5, 70.0, 5000.0])
+def test_a_base_that_floats_goes_as_far_as_it_is_asked_to(far):
+    """Steps of 0.2 m did not take it 70 m, which was said to be unreachable."""
+    robot = Robot.named("quadruped")
+    tip = robot.frame(robot.end_effector)
+    there = State.at(robot, robot.rest).position(tip) + np.array([far, -far, 0.0])
+    found = solve_ik(robot, robot.rest, [Position(tip, Still(there))], until=1e-6)
+    assert (found.verdict, found.starts) == ("reached", 1)
+    np.testing.assert_allclose(State.at(robot, found.q).position(tip), there, atol=1e-6)
 
 
 @pytest.mark.parametrize("far", [1e200, 1e308])

@@ -138,6 +138,7 @@ def refuse(file: Compiled) -> None:
 _CONNECT, _WELD, _JOINT, _TENDON = 0, 1, 2, 3  # mjtEq
 _WRAP_JOINT = 1                    # mjtWrap
 _SITE = 6                          # mjOBJ_SITE
+_TURNS = 10                        # of the data of a weld: torquescale, 0 if it lets bodies turn
 
 
 def couplings(part: Part) -> tuple[tuple[Coupled, ...], list[str]]:
@@ -212,7 +213,7 @@ def loops(built: Built) -> tuple[tuple[Loop, ...], list[str]]:
                     mj.body_mocapid[mj.body_rootid[body]] < 0 for body in bodies):
                 if len(joints) == 2:  # else nothing moves between its ends
                     ends = (_anchor(built, i, 0, name), _anchor(built, i, 1, name))
-                    found.append(Loop(name, ends, kind == _WELD))
+                    found.append(Loop(name, ends, kind == _WELD and bool(mj.eq_data[i, _TURNS])))
             elif any(joints):
                 said.append(f"equality {name!r} is left out: a body of it is not of the robot")
     idle = [_name(mj, i) for i in range(mj.neq) if not _acts(mj, i)]

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from hierarchy.errors import RobotError, check_name, naming
+from hierarchy.errors import OF_PROCESS, RobotError, check_name, naming
 from hierarchy.problem import Array
 from hierarchy.robots.joints import Part as JointPart
 from hierarchy.robots.joints import set_joint
@@ -54,7 +54,7 @@ def compiled(path: Path) -> Compiled:
     except ImportError as error:
         raise RobotError(f"robot file {file!r}: an MJCF is compiled by MuJoCo, which is not "
                          f"installed: {_REMEDY}") from error
-    with warnings.catch_warnings(record=True) as warned:
+    with OF_PROCESS, warnings.catch_warnings(record=True) as warned:
         warnings.simplefilter("always")
         try:
             model = (_compiled(mujoco.MjSpec.from_file(file)) if path.suffix == ".xml" else
