@@ -56,6 +56,8 @@ def _skeleton(words: Iterator[str]) -> list[_Joint]:
             name, parent = next(words), open_[-1] if open_ else None
             if word == "End":
                 name = f"{joints[open_[-1]].name} end"
+            elif name in [joint.name for joint in joints]:
+                raise ValueError(f"joint {name!r} comes twice")
             joints.append(_Joint(name, parent, (0.0, 0.0, 0.0), ()))
         elif word == "{":
             open_.append(len(joints) - 1)

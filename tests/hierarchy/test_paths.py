@@ -108,6 +108,7 @@ def test_turns_follow_the_order_of_the_channels():
 @pytest.mark.parametrize(("old", "new", "said"), [
     ("MOTION", "", "is no BVH file"), ("OFFSET 0 -3 0", "OFFSET 0 -3", "is no BVH file"),
     ("  JOINT hand", "  LIMB hand", "'LIMB' is unknown there"),
+    ("  JOINT hand", "  JOINT knee", "joint 'knee' comes twice"),
     ("0 10 0 90 0 90 90", "0 10 0", "is no BVH file"), ("0.5", "0.0", "a positive time"),
     ("0 10 0 90 0 90 90", "0 nan 0 90 0 90 90", "frames of finite numbers"),
     ("Xrotation Yrotation", "Xrotation Wrotation", "'wrotation' is unknown"),
