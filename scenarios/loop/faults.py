@@ -34,7 +34,7 @@ class Faults:
 
     def __init__(self, scenario: Scenario) -> None:
         self._sections, self._now = scenario.faults, 0.0
-        self._half = scenario.control.period / 2
+        self._period = scenario.control.period
         self._skipped, self._skipped_at = 0.0, -1.0
         self._standing: set[int] = set()
 
@@ -78,7 +78,7 @@ class Faults:
             self._skipped += sum(fault.takes or 0.0 for fault in self.now("overrun"))
 
     def _on(self, fault: FaultSection) -> bool:
-        return 0.0 <= self._now - fault.at + self._half < fault.duration
+        return bool(fault.acts(self._now, self._period))
 
     def _place_obstacles(self) -> None:
         """Place the obstacles of faults for this time."""

@@ -21,7 +21,7 @@ from solvers import Status, explain, make
 from solvers.explain import is_missed
 
 _NAMED = 3        # pairs of capsules named at most
-_ROUNDING = 1e-6  # [m] below a distance that is not said, and of a period
+_ROUNDING = 1e-6  # [m] below a distance that is not said
 _NOTHING = 1e-12  # violation that rounding leaves of a robot at rest at its targets
 _MET = 1e-6       # violation of a level relative to its terms, below which it is met
 
@@ -138,12 +138,12 @@ def _idle(scenario: Scenario) -> Iterator[str]:
     end, period = scenario.control.duration, scenario.control.period
     begins, pushes = period * np.arange(scenario.control.ticks), getattr(
         scenario.plant, "pushes", ())
-    for key, events, rounded in (("faults", scenario.faults, period / 2),
-                                 ("plant.pushes", pushes, _ROUNDING * period)):
-        for i, one in enumerate(events):
-            passed = begins + rounded - one.at
-            if one.at >= end:
-                yield f"{key}.{i}.at = {one.at:g} s is after the run, which ends at {end:g} s"
-            elif not ((passed >= 0.0) & (passed < one.duration)).any():
-                yield (f"{key}.{i} does nothing: from {one.at:g} s, for {one.duration:g} s, it "
-                       f"falls between two ticks of {period:g} s")
+    for key, one, acts in (
+            *((f"faults.{i}", one, one.acts(begins, period))
+              for i, one in enumerate(scenario.faults)),
+            *((f"plant.pushes.{i}", one, one.acts(begins)) for i, one in enumerate(pushes))):
+        if one.at >= end:
+            yield f"{key}.at = {one.at:g} s is after the run, which ends at {end:g} s"
+        elif not acts.any():
+            yield (f"{key} does nothing: from {one.at:g} s, for {one.duration:g} s, it falls "
+                   f"between two ticks of {period:g} s")

@@ -215,6 +215,11 @@ class FaultSection(keys.Section):
     place: PointSection | None = None  #: Point of the robot, in place of `centre`.
     radius: keys.Length | None = None  #: Radius of the sphere.
 
+    def acts(self, t: Any, period: float) -> Any:
+        """Whether it acts in the tick or ticks (...) at t [s]: it begins in the nearest one."""
+        passed = t - self.at + period / 2
+        return (passed >= 0.0) & (passed < self.duration)
+
     def _wrong(self) -> Iterator[str]:
         of_kind = {"nan_position": {"joint"}, "nan_velocity": {"joint"}, "nan_distance": {"point"},
                    "status": {"status"}, "overrun": {"takes"},
