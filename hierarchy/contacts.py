@@ -28,6 +28,7 @@ from hierarchy.errors import (
     expect_each,
     finite_numbers,
     refuse,
+    text,
 )
 from hierarchy.gate import array_of, axes_along, readable, shaped
 from hierarchy.jit import compiled
@@ -71,7 +72,7 @@ class Contact:
 
     def __post_init__(self) -> None:
         expect("contact: frame", self.frame, Frame, "give robot.frame(name)")
-        expect("contact: name", self.name, str, "give a text")
+        text("contact: name", self.name)
         expect("contact: slides", self.slides, bool, "give True or False")
         set_frozen(self, name=self.name or self.frame.name)
         check_fields(self, f"contact {self.name!r}")

@@ -29,6 +29,7 @@ from hierarchy.errors import (
     naming,
     of_user,
     refuse,
+    text,
     whole,
 )
 from hierarchy.gate import array_of, check_rotation, shaped
@@ -148,7 +149,7 @@ class Robot:
     def __init__(self, model: Any, name: str, end_effector: str | None = None,
                  found: Found | None = None) -> None:
         expect("Robot: model", model, pin.Model, "Robot.load makes a robot of a name or a file")
-        expect("Robot: name", name, str, "give a text")
+        text("Robot: name", name)
         self.model, self.name = model, name
         self.n, self.nq = int(model.nv), int(model.nq)
         refuse(self.n == 0, f"robot {name!r} has no joint that moves; with base = 'floating' it "
@@ -158,10 +159,7 @@ class Robot:
         self.actuated = 6 if self.base == "floating" else 0
         self.joint_names: tuple[str, ...] = tuple(model.names)[1:]
         self.parents: tuple[int, ...] = tuple(int(i) for i in model.parents)
-        for last, parent in enumerate(self.parents[1:]):  # else pinocchio's inertia is wrong
-            refuse(parent not in model.supports[last].tolist(), f"robot {name!r}: joint "
-                   f"{self.joint_names[last]!r} hangs on {model.names[parent]!r}, and other "
-                   "branches are between them; give branch after branch", RobotError)
+        _check_order(model, name)
         # pinocchio has huge numbers for "none".
         self.lower, self.upper = (np.where(np.abs(limit) > 1e300, none, limit) for limit, none in (
             (model.lowerPositionLimit, -np.inf), (model.upperPositionLimit, np.inf)))
@@ -489,6 +487,14 @@ class Robot:
 
     def __repr__(self) -> str:
         return f"Robot({self.name!r}, n={self.n})"
+
+
+def _check_order(model: Any, name: str) -> None:
+    """Raise a RobotError unless branch comes after branch: pinocchio's inertia would be wrong."""
+    for last, parent in enumerate(list(model.parents)[1:]):
+        refuse(parent not in model.supports[last].tolist(), f"robot {name!r}: joint "
+               f"{model.names[last + 1]!r} hangs on {model.names[parent]!r}, and other "
+               "branches are between them; give branch after branch", RobotError)
 
 
 def _check_base(model: str | Path, base: object) -> None:

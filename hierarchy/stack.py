@@ -17,6 +17,7 @@ from hierarchy.errors import (
     is_one_of,
     naming,
     refuse,
+    text,
     whole,
 )
 from hierarchy.gate import Sizes, checked_give, checked_metric
@@ -118,7 +119,7 @@ class Stack:
     def insert(self, task: Task, index: int | None = None) -> None:
         """Insert a task at `index` of the order, 0 being the most important; None for the end."""
         expect("a stack", task, Task, "a task says itself what it moves; see hierarchy.tasks")
-        expect(f"{type(task).__name__}: name", task.name, str, "give a text")
+        text(f"{type(task).__name__}: name", task.name)
         refuse(task.name in self._tasks, f"the stack already has a task {task.name!r}; "
                "give each its own name")
         if task.of_forces and (self.level == "torque" or task.contacts is not None):

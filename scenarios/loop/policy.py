@@ -29,10 +29,10 @@ class Policy:
     `clamp` moves a command (n,) to the nearest one that the robot's limits allow in this tick; None
     for a robot without limits. `again` does so with one that is sent again, by default `clamp`. At
     level "torque" `torques` returns those, within their limits, of accelerations (n,) and contact
-    forces, None for none. After `choose`: `events` are the (kind,
-    action) pairs of the tick; `slowing` [1/s] is the deceleration per velocity where it brakes,
-    else 0; `fault` is the reason for ending the run, once a "stop" was requested, and `stopped` is
-    whether the robot has come to rest since then, or at level "torque" is to be left to itself.
+    forces, None for none. After `choose`: `events` are the (kind, action) pairs of the tick;
+    `slowing` [1/s] is the deceleration per velocity where it brakes, else 0; `fault` is the reason
+    for ending the run, once a "stop" was requested, and `stopped` is whether the robot has come to
+    rest since then, or at level "torque" is to be left to itself.
     """
 
     def __init__(self, control: ControlSection, clamp: Callable[[Array], Array] | None = None,

@@ -51,7 +51,7 @@ def test_a_live_run_that_nobody_touches_is_the_run_itself_and_starts_again_with_
     live.drag(0, (0.0, 0.0, 0.1))
     live.change({"pointing.alpha_d": 15.0})
     ticks(live, 50)
-    live.save(tmp_path / "run")
+    save(live.recording(), tmp_path / "run", live.changes)
     kept = json.loads((tmp_path / "run" / "changes.json").read_text())
     assert [(one["t"], one["key"]) for one in kept][-1] == (0.01, "pointing.alpha_d")
     live.restart()

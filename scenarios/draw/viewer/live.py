@@ -4,7 +4,6 @@ import time
 from collections.abc import Mapping
 from contextlib import suppress
 from dataclasses import replace
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -17,7 +16,6 @@ from scenarios.config.sections.plant import KinematicSection
 from scenarios.loop.controller import Controller
 from scenarios.loop.simulation import rehearsed, tick, watching
 from scenarios.measure.judging import Fates, completed
-from scenarios.measure.run_folder import save
 from scenarios.measure.verdict import verdict
 from scenarios.recording.recording import Recording
 from scenarios.scene.drawn import Scene, scene
@@ -147,12 +145,6 @@ class Live:
             so_far = self.recorder.finish(self.begun, self.fault if self.over else None)
             self._goals = ticks, now, verdict(so_far).on_page()
         return self._goals[2]
-
-    def save(self, folder: Path) -> Recording:
-        """Write the run's folder as `hierarchy run` does, and any changes to `changes.json`."""
-        recording = self.recording()
-        save(recording, folder, self.changes)
-        return recording
 
     def _take_over(self, scenario: Scenario, changes: Mapping[str, Any]) -> None:
         """Continue with another scenario of the same robot and plant."""
