@@ -27,8 +27,8 @@ class Policy:
     """Chooses the command of each tick.
 
     `clamp` moves a command (n,) to the nearest one that the robot's limits allow in this tick; None
-    for a robot without limits. `again` does so with one that is sent again, by default `clamp`. At
-    level "torque" `torques` returns those, within their limits, of accelerations (n,) and contact
+    for a robot without limits. `again` does so in a tick with trouble, by default `clamp`. At level
+    "torque" `torques` returns those, within their limits, of accelerations (n,) and contact
     forces, None for none. After `choose`: `events` are the (kind, action) pairs of the tick;
     `slowing` [1/s] is the deceleration per velocity where it brakes, else 0; `fault` is the reason
     for ending the run, once a "stop" was requested, and `stopped` is whether the robot has come to
@@ -77,7 +77,7 @@ class Policy:
             action = "brake"
         self.events = [(kind, action) for kind in troubles]
         if action == "use":
-            return self._within(self._clamp, x)
+            return self._within(self._again, x)
         if action == "hold" and held is not None:
             self._held += 1
             return self._within(self._again, held)

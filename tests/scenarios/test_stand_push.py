@@ -39,7 +39,18 @@ class Failing:
 
     def solve(self, h, memory=None):
         res, self.left = self.inner.solve(h, memory), self.left - 1
-        return res if self.left >= 0 else Resolution(res.x, self.status)
+        return res if self.left >= 0 else Resolution(1.1 * res.x, self.status)
+
+
+def test_an_inaccurate_answer_is_used_within_the_torque_step():
+    scenario = SHORT.with_changes({"limits.torque_step": 0.3, "control.policy.inaccurate": "use"})
+    controller = Controller(scenario)
+    controller.resolver, recorder = Failing(Status.INACCURATE, 8), Recorder(controller, 10)
+    for k in range(10):
+        assert tick(controller, recorder, k * 1e-3) is None
+    run = recorder.finish(scenario, None)
+    assert run.events[-1] == (9, "beyond_limits", "clamp")
+    assert np.abs(np.diff(run["command"], axis=0)).max() == pytest.approx(0.3, abs=1e-9)
 
 
 @pytest.mark.parametrize("action", ["hold", "brake"])
