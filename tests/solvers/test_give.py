@@ -119,21 +119,14 @@ def test_the_certificate_rejects_another_x_and_a_witness_that_misses_more(wrong)
 
 @pytest.mark.parametrize("resolver", [make("hcod"), make("hcod", damping=0.1), make("hqp")],
                          ids=lambda one: one.label)
-@pytest.mark.parametrize("wrong", [np.nan, -1.0])
-def test_a_give_that_became_wrong_in_place_fails_with_zeros(resolver, wrong):
+@pytest.mark.parametrize(("array", "wrong"), [("give", np.nan), ("give", -1.0), ("A", np.nan)])
+def test_where_a_part_has_no_answer_the_whole_has_none(resolver, array, wrong):
     h = problem(0, 0.1)
-    h.give[3] = wrong
-    res = resolver.solve(h)
-    assert (res.status, res.x.any()) == (Status.NUMERICAL_FAILURE, False)
-
-
-@pytest.mark.parametrize("name", ["hcod", "hqp"])
-def test_where_a_part_has_no_answer_the_whole_has_none(name):
-    h, resolver = problem(0, 0.1), make(name)
     memory = resolver.solve(h).memory
-    h.A[0, 0] = np.nan
+    getattr(h, array).flat[3] = wrong
     for res in (resolver.solve(h), resolver.solve(h, memory)):
-        assert (res.status, res.x.any(), res.memory) == (Status.NUMERICAL_FAILURE, False, None)
+        assert (res.status, res.x.any()) == (Status.NUMERICAL_FAILURE, False)
+        assert res.memory is None or array == "give"
         assert res.active is None or 1 not in np.abs(res.active)
 
 
