@@ -89,3 +89,10 @@ def deproject(pinhole, pixels):
 def resting(place, frame=FRAME, **settings):
     """A task: a frame is to be where it then rests."""
     return tasks.Position(frame, Still(place), **settings)
+
+
+def of_user(name, dimension, error, jacobian, **more):
+    """A task that a user writes: its error and rows as functions of a state, other attributes."""
+    given = {"error": error, "jacobian": jacobian, "jacobian_derivative": jacobian}
+    methods = {key: lambda self, state, of=of: of(state) for key, of in given.items()}
+    return type("OfUser", (Task,), {"name": name, "dimension": dimension, **methods, **more})()

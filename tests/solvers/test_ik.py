@@ -7,7 +7,7 @@ from functools import partial
 import numpy as np
 import pinocchio as pin
 import pytest
-from scene import FRAME, ROBOT, resting
+from scene import FRAME, ROBOT, of_user, resting
 from standing import ROBOT as HUMANOID
 from standing import WEIGHT, feet, standing_stack
 from urdf_text import LIMIT, joint, link, loaded, placed
@@ -293,24 +293,16 @@ def test_joints_that_do_not_help_stay_though_a_target_is_out_of_reach():
     np.testing.assert_allclose(found.q[:3], Q[:3], atol=1e-9)
 
 
-class InBall(Task):
-    """A hand within 0.1 m of a point."""
-
-    name, dimension, kind, gain, centre = "in ball", 1, "inequality", 5.0, np.array([0.4, 0.2, 0.4])
-
-    def error(self, state):
-        return np.array([np.sum((state.position(FRAME) - self.centre)**2) - 0.01])
-
-    def jacobian(self, state):
-        to_hand = state.position(FRAME) - self.centre
-        return -2.0 * to_hand[None] @ resting([0.0] * 3).jacobian(state)
-
-    jacobian_derivative = jacobian
+BALL = np.array([0.4, 0.2, 0.4])
+IN_BALL = of_user(
+    "in ball", 1, lambda state: [np.sum((state.position(FRAME) - BALL)**2) - 0.01],
+    lambda state: -2.0 * (state.position(FRAME) - BALL)[None] @ resting([0.0] * 3).jacobian(state),
+    kind="inequality", gain=5.0)  # within 0.1 m of its centre
 
 
 def test_beyond_a_curved_bound_the_nearest_point_on_it_is_found():
     """Whole steps overshot by the bound's curvature, and ended 22 mm beside it."""
-    found = solve_ik(ROBOT, Q, [InBall(), resting([0.7, 0.2, 0.4])], until=1e-6)
+    found = solve_ik(ROBOT, Q, [IN_BALL, resting([0.7, 0.2, 0.4])], until=1e-6)
     assert found.errors["position"] == pytest.approx(0.2, abs=1e-4)
     assert found.verdict.endswith("held back by in ball")
 
