@@ -246,7 +246,15 @@ def test_directions_that_rows_see_by_rounding_do_not_break_the_bounds_of_others(
         assert h.violations(res.x)[0] < 1e-12
 
 
+E = 1.8e-7  # of an arm that is straight but for seven digits of pi: the rows nearly along one axis
+SAWYER = [[-0.1603, 0.0, -E, 0.0, -E, 0.0, -E, 0.0], [1.0155, 0.0, 0.0, E, 0.0, E, 0.0, 0.0],
+          [0.0, 0.0, -0.9345, -0.0322, -0.5345, 0.1363, -0.1345, 0.0]]
+
+
 @pytest.mark.parametrize(("name", "h", "status"), [
+    *(("hcod", Hierarchy.from_levels([
+        (np.eye(8), [-20.0] * 8, [20.0] * 8), (SAWYER, [0.0, 0.0, speed]),
+        (np.eye(8), [0.0] * 8)]), Status.SOLVED) for speed in np.linspace(0.2, 2.0, 10)),
     ("hqp", problems.structured(10, ["chain"]), Status.SOLVED),  # rows violated by a little on the
     ("hqp", problems.structured(5000281), Status.SOLVED),  # |x| = 1e8        # way hold nearby
     ("hcod", problems.structured(7102002, ["nearly_parallel"]), Status.SOLVED),  # rows cut twice

@@ -199,15 +199,6 @@ def test_explain_says_where_the_limit_was_before_a_witness_was_found(metric):
     assert "limit was reached at 'level 2'" in explain(h, found).splitlines()[-1]
 
 
-def test_explain_does_not_say_that_rows_give_by_rounding():
-    """At x = 0 rows gave 1e-16 of 0."""
-    turn = np.arange(4) * np.pi / 2.0
-    opposite = np.column_stack([np.cos(turn), np.sin(turn)]), [-np.inf] * 4, [-0.5] * 4
-    h = Hierarchy.from_levels([opposite, (np.eye(2), [1.0, 0.0])], give=[[0.0, 0.2, 0.0, 0.0], 0.0])
-    said = explain(h, make("hcod").solve(h)).splitlines()[0]
-    assert said == "level 1 is missed by 1, of which 1 cannot be avoided."
-
-
 EVERY_STRICT = [make(name) for name in names() if make(name).strict]
 INEQUALITIES = [r for r in EVERY_STRICT if r.handles == "inequalities"]
 BOUNDS = [r for r in EVERY_STRICT if r.handles == "bounds"]
