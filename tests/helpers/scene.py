@@ -84,3 +84,15 @@ def deproject(pinhole, pixels):
     u, v, depth = np.moveaxis(np.asarray(pixels, dtype=float), -1, 0)
     seen = [(u - pinhole.cx) / pinhole.fx * depth, (v - pinhole.cy) / pinhole.fy * depth, depth]
     return np.stack(seen, axis=-1) @ np.asarray(pinhole.rotation).T + np.asarray(pinhole.position)
+
+
+def resting(place, frame=FRAME, **settings):
+    """A task: a frame is to be where it then rests."""
+    return tasks.Position(frame, Still(place), **settings)
+
+
+def of_user(name, dimension, error, jacobian, **more):
+    """A task that a user writes: its error and rows as functions of a state, other attributes."""
+    given = {"error": error, "jacobian": jacobian, "jacobian_derivative": jacobian}
+    methods = {key: lambda self, state, of=of: of(state) for key, of in given.items()}
+    return type("OfUser", (Task,), {"name": name, "dimension": dimension, **methods, **more})()

@@ -1,4 +1,6 @@
-"""URDF files as text."""
+"""URDF files as text, and robots of them."""
+
+from hierarchy import Robot
 
 LIMIT = '<limit lower="-1" upper="1" velocity="2" effort="3"/>'
 INERTIAL = """<inertial><origin xyz="0.1 0.2 0.3"/><mass value="2"/>
@@ -25,3 +27,9 @@ def shape(geometry, xyz="0 0 0"):
 
 def urdf(*parts):
     return '<robot name="r">' + "".join(parts) + "</robot>"
+
+
+def loaded(folder, *parts, end_effector=None, **options):
+    """Return the robot of a URDF file that is written into a folder."""
+    (folder / "r.urdf").write_text(urdf(*parts))
+    return Robot.load(folder / "r.urdf", end_effector, **options)

@@ -64,17 +64,18 @@ def scaled(by):
     return row
 
 
-def test_measures_that_one_function_makes_are_as_different_as_their_numbers():
-    """All had the code of the first, also in later processes."""
+def test_the_digest_of_a_kernel_is_that_of_its_files_and_of_the_numbers_and_arrays_it_names(
+        monkeypatch):
+    """Measures that one function made had the code of the first; a bundle names files relatively.
+    """
     first, second, again = map(source_digest, map(scaled, (1.0, 2.0, 1.0)))
     assert first == again != second
-
-
-def test_a_number_or_array_that_a_kernel_names_counts(monkeypatch):
     before = source_digest(weighted)
     monkeypatch.setitem(globals(), "weights", np.array([1.0, 3.0]))
     assert source_digest(weighted) != before
-
+    function = solve_hierarchy.py_func
+    bundled = FunctionType(function.__code__.replace(co_filename="exact.py"), function.__globals__)
+    assert source_digest(bundled) == source_digest(solve_hierarchy) != ""
 
 @pytest.fixture(scope="module")
 def made(tmp_path_factory):
@@ -96,12 +97,6 @@ def ask(made, tmp_path):
 
 def files(folder):
     return [path for path in folder.rglob("*") if path.is_file() and "__pycache__" not in str(path)]
-
-
-def test_the_files_of_a_kernel_are_found_though_its_code_names_them_relative_to_a_bundle():
-    function = solve_hierarchy.py_func
-    bundled = FunctionType(function.__code__.replace(co_filename="exact.py"), function.__globals__)
-    assert source_digest(bundled) == source_digest(solve_hierarchy) != ""
 
 
 @pytest.mark.parametrize(("file", "old", "new"), [

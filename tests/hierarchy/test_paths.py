@@ -75,22 +75,6 @@ def test_a_path_of_a_csv_file_passes_its_points_with_continuous_acceleration(nam
     np.testing.assert_allclose(path(TIMES[-1] - 1e-9)[1], 0.0, atol=1e-6)
 
 
-@pytest.mark.parametrize(("text", "said"), [
-    ("t,x,y,z\n0,0,0,0\n1,0,0\n", "line 3: expected t, x, y, z, got '1,0,0'"),
-    ("0,0,0,0\n1,a,0,0\n", "line 2: expected t, x, y, z, got '1,a,0,0'"),
-    ("0,0,0,0;\n1,0,0,0\n2,0,0,0\n", "line 1: expected t, x, y, z, got '0,0,0,0;'"),
-    ("t,x,y,z\n\n0,0,0,0\n1,0,0\n", "line 4: expected t, x, y, z, got '1,0,0'"),
-    ("0,0,0,0\n1,nan,0,0\n", "points[1] [m]: expected 3 finite numbers"),
-    ("0,0,0,0\n0,1,0,0\n", "times must increase"), ("0,0,0,0\n", "one point is no motion"),
-    ("", "0 times for 0 points")])
-def test_a_wrong_csv_file_is_named_with_its_line(text, said, tmp_path):
-    (tmp_path / "a.csv").write_text(text)
-    text = refused(said, paths.Recorded.from_csv, tmp_path / "a.csv")
-    assert text.startswith(str(tmp_path / "a.csv"))
-    refused("cannot be read", paths.Recorded.from_csv, tmp_path / "none.csv")
-
-
-# BVH files.
 BVH = FilePath(__file__).parents[1] / "data" / "motion.bvh"
 
 
@@ -105,16 +89,24 @@ def test_turns_follow_the_order_of_the_channels():
         np.testing.assert_allclose(motion.positions[name], places, atol=1e-12, err_msg=name)
 
 
-@pytest.mark.parametrize(("old", "new", "said"), [
-    ("MOTION", "", "is no BVH file"), ("OFFSET 0 -3 0", "OFFSET 0 -3", "is no BVH file"),
-    ("  JOINT hand", "  LIMB hand", "'LIMB' is unknown there"),
-    ("  JOINT hand", "  JOINT knee", "joint 'knee' comes twice"),
-    ("0 10 0 90 0 90 90", "0 10 0", "is no BVH file"), ("0.5", "0.0", "a positive time"),
-    ("0 10 0 90 0 90 90", "0 nan 0 90 0 90 90", "frames of finite numbers"),
-    ("Xrotation Yrotation", "Xrotation Wrotation", "'wrotation' is unknown"),
-    ("0 90 90\n", "0 90 90\n}", "is no BVH file")])
-def test_a_wrong_file_is_named(tmp_path, old, new, said):
-    file = tmp_path / "motion.bvh"
-    file.write_text(BVH.read_text().replace(old, new, 1))
-    assert str(file) in refused(said, paths.read_bvh, file)
-    refused("cannot be read", paths.read_bvh, tmp_path / "none.bvh")
+@pytest.mark.parametrize(("read", "text", "said"), [
+    *((paths.Recorded.from_csv, text, said) for text, said in (
+        ("t,x,y,z\n0,0,0,0\n1,0,0\n", ", line 3: expected t, x, y, z, got '1,0,0'"),
+        ("0,0,0,0\n1,a,0,0\n", ", line 2: expected t, x, y, z, got '1,a,0,0'"),
+        ("0,0,0,0;\n1,0,0,0\n2,0,0,0\n", ", line 1: expected t, x, y, z, got '0,0,0,0;'"),
+        ("t,x,y,z\n\n0,0,0,0\n1,0,0\n", ", line 4: expected t, x, y, z, got '1,0,0'"),
+        ("0,0,0,0\n1,nan,0,0\n", ": points[1] [m]: expected 3 finite numbers"),
+        ("0,0,0,0\n0,1,0,0\n", "times must increase"), ("0,0,0,0\n", "one point is no motion"),
+        ("", "0 times for 0 points"))),
+    *((paths.read_bvh, BVH.read_text().replace(old, new, 1), said) for old, new, said in (
+        ("MOTION", "", " is no BVH file"), ("OFFSET 0 -3 0", "OFFSET 0 -3", " is no BVH file"),
+        ("  JOINT hand", "  LIMB hand", "'LIMB' is unknown there"),
+        ("  JOINT hand", "  JOINT knee", "joint 'knee' comes twice"),
+        ("0 10 0 90 0 90 90", "0 10 0", " is no BVH file"), ("0.5", "0.0", "a positive time"),
+        ("0 10 0 90 0 90 90", "0 nan 0 90 0 90 90", "frames of finite numbers"),
+        ("Xrotation Yrotation", "Xrotation Wrotation", "'wrotation' is unknown"),
+        ("0 90 90\n", "0 90 90\n}", " is no BVH file")))])
+def test_a_wrong_file_is_named(tmp_path, read, text, said):
+    (tmp_path / "a").write_text(text)
+    assert refused(said, read, tmp_path / "a").startswith(str(tmp_path / "a"))
+    refused("cannot be read", read, tmp_path / "none")

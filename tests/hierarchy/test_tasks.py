@@ -8,11 +8,11 @@ import numpy as np
 import pinocchio as pin
 import pytest
 from refusals import refused
-from scene import FRAME, PATH, ROBOT, TASKS, compiled_rows, place_of, state_at, states
+from scene import FRAME, PATH, ROBOT, TASKS, compiled_rows, of_user, place_of, state_at, states
 from scipy.linalg import expm
-from urdf_text import LIMIT, joint, link, placed, urdf
+from urdf_text import LIMIT, joint, link, loaded, placed
 
-from hierarchy import Robot, Stack, State, Task, tasks
+from hierarchy import Robot, Stack, State, tasks
 from hierarchy.activation import Activation
 from hierarchy.avoidance import Barrier, Measurement, Pairs
 from hierarchy.kinematics import cross, rotation_vector
@@ -44,12 +44,10 @@ def test_jacobian_is_the_derivative_of_what_the_error_measures(name):
 
 
 def test_a_row_that_only_the_decimals_of_a_file_fill_is_zero(tmp_path):
-    path = tmp_path / "arm.urdf"
-    path.write_text(urdf(
-        *map(link, "abc"), joint("j", "revolute", "a", "b", LIMIT, "0 0 1",
-                                 placed("0 0 0", "1.57079632679 0 0")),
-        joint("k", "fixed", "b", "c", "", "", placed("1 0 0"))))
-    robot = Robot.load(path)
+    turned = placed("0 0 0", "1.57079632679 0 0")
+    robot = loaded(tmp_path, *map(link, "abc"),
+                   joint("j", "revolute", "a", "b", LIMIT, "0 0 1", turned),
+                   joint("k", "fixed", "b", "c", "", "", placed("1 0 0")))
     state, tip = State.at(robot, [0.0]), robot.frame("c")
     for task in (tasks.Position(tip, PATH), tasks.Pose(tip, PATH, np.eye(3))):
         np.testing.assert_array_equal(task.jacobian(state)[:2], 0.0)
@@ -202,28 +200,13 @@ def test_tasks_of_the_same_settings_are_equal_and_print_their_settings_alone(tas
         assert (f" {field.name}=" in f" {repr(task).partition('(')[2]}") == field.init
 
 
-class First(Task):
-    """The first joint, by a user: of its one row the methods return a number."""
-
-    name, dimension = "first", 1
-
-    def error(self, state):
-        return 0.3 - state.q[0]
-
-    def jacobian(self, state):
-        return np.eye(1, state.n)
-
-    jacobian_derivative = jacobian
-
-    def desired_velocity(self, state):
-        return 0.1
-
-
-def test_a_number_for_the_only_row_serves_together_with_others():
-    state, whole = State.at(ROBOT, ROBOT.rest), tasks.Together([First(), tasks.Posture([0.5] * 7)])
+def test_a_number_for_the_only_row_of_a_users_task_serves_together_with_others():
+    first = of_user("first", 1, lambda state: 0.3 - state.q[0], lambda state: np.eye(1, state.n),
+                    desired_velocity=lambda self, state: 0.1)
+    state, whole = State.at(ROBOT, ROBOT.rest), tasks.Together([first, tasks.Posture([0.5] * 7)])
     np.testing.assert_array_equal(whole.error(state), [0.3, *[0.5] * 7])
     np.testing.assert_array_equal(whole.desired_velocity(state), [0.1, *[0.0] * 7])
-    np.testing.assert_allclose(Activation(state, [First()], {"first": 0.6})(), [0.5])
+    np.testing.assert_allclose(Activation(state, [first], {"first": 0.6})(), [0.5])
 
 
 def test_frames_and_points_are_compared_by_their_numbers():

@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass, replace
 from functools import partial
+from operator import methodcaller
 from pathlib import Path
 from threading import Event
 from typing import Annotated, Literal
@@ -9,7 +10,7 @@ from typing import Annotated, Literal
 import numpy as np
 import pytest
 from refusals import refused
-from scene import FRAME, ROBOT, SENSOR, state_at
+from scene import FRAME, ROBOT, SENSOR, resting, state_at
 from standing import CONTACTS, feet, opening
 from standing import ROBOT as HUMANOID
 
@@ -48,8 +49,7 @@ STATE = State.at(ROBOT, [0.9, -0.85, 0.9, 1.2, 0.97, 1.8, 0.0])
 URDF = Path(__file__).parents[2] / "examples/robots/iiwa14.urdf"
 BARE, PANDA = (State.at(robot, robot.rest) for robot in (
     Robot.load(URDF.with_stem(name)) for name in ("so101", "panda")))
-THERE = Still([0.3, 0.5, 0.1])
-HAND = tasks.Position(FRAME, THERE)
+THERE, HAND = Still([0.3, 0.5, 0.1]), resting([0.3, 0.5, 0.1])
 LIMITS, POINTS = tasks.JointLimits(ROBOT, 10.0, 0.01), ROBOT.control_points
 ARM, KEPT = ROBOT.capsules, Barrier(0.02)
 TIMES, CORNERS = (0.5, 1.2), ((0.0, 0.0, 0.1), (0.3, 0.1, 0.2))
@@ -122,6 +122,10 @@ def grown():
     stack.hierarchy(State.at(ROBOT, STATE.q))
 
 
+def rows_of(task, level="velocity", state=STATE, **given):
+    return Stack([task], level, **given).hierarchy(state)
+
+
 def slow(speed):
     robot = Robot.named("kuka_lwr")
     robot.velocity_limit[0] = speed
@@ -150,39 +154,32 @@ def limits(**settings):
     (lambda: Own(FRAME, THERE, speed="fast"), "'position': speed = 'fast': expected a number"),
     (lambda: tasks.JointLimits("kuka_lwr", 10.0, 0.01), "give Robot.load('kuka_lwr')"),
     (lambda: Stack(["position"]), "a stack: expected a Task, got str 'position'"),
-    (lambda: Stack([HAND]).hierarchy(ROBOT), "state: expected a State, got Rob"),
+    (lambda: rows_of(HAND, state=ROBOT), "state: expected a State, got Rob"),
     (lambda: STATE.position(PALM), "frame 'left_hand' is on joint 22, and robot 'kuka_lwr' has 7"),
     (lambda: tasks.Position(PALM, THERE).error(STATE), "task 'position': frame is on joint"),
-    (lambda: Stack([tasks.Position(PALM, THERE)]).hierarchy(STATE), "has 7 joints: it is of ano"),
-    (lambda: Stack([tasks.CentreOfMass(HUMANOID, THERE)]).hierarchy(STATE),
-     "task 'centre of mass': robot is of robot 'humanoid', not of 'kuka_lwr'"),
+    (lambda: rows_of(tasks.Position(PALM, THERE)), "has 7 joints: it is of ano"),
+    (lambda: rows_of(tasks.CentreOfMass(HUMANOID, THERE)), "'centre of mass': robot is of robot '"),
     (lambda: tasks.Avoidance(HUMANOID.control_points).jacobian(STATE), "points is on joint"),
     (lambda: tasks.Friction(CONTACTS).rows(STATE), "contacts is of robot 'humanoid'"),
     (lambda: Contacts(ROBOT, [Contact(PALM)]), "contact 'left_hand' is on joint"),
     (lambda: CONTACTS.jacobian(STATE), "contacts: state is of robot"),
     (lambda: CONTACTS.torques(STATE, np.zeros(CONTACTS.unknowns)), "contacts: state is of robot"),
     (lambda: tasks.TorqueStep(ROBOT, A), "'torque step': step = array"),
-    (lambda: tasks.Separation(POINTS, KEPT, 1.5), "obstacles = 1.5: expected a whole number"),
     (lambda: tasks.CumulatedRepulsion(7, POINTS, 0.1, "damping"), "base: expected a Task, got str"),
-    (lambda: tasks.JointDamping(7, [1.0] * 7), "damping': damping = [1.0, 1.0"),
-    (lambda: Stack([tasks.Position(FRAME, THERE, gain=[1.0, 2.0])]).hierarchy(STATE),
-     "gain has the shape (2,), expected a number or (3,)"),
-    *((lambda method=method: getattr(tasks.Position(FRAME, THERE, gain=[1.0, 2.0]), method)(STATE),
+    *((lambda ask=ask: ask(resting([0.3, 0.5, 0.1], gain=[1.0, 2.0])),
        "task 'position': gain has the shape (2,), expected a number or (3,)")
-      for method in ("error", "jacobian", "reference_velocity")),
+      for ask in (rows_of, *(methodcaller(name, STATE) for name in (
+          "error", "jacobian", "reference_velocity")))),
     (lambda: tasks.CentreOfMass(ROBOT, THERE, 2), "axes: expected finite numbers, got int 2"),
     (lambda: tasks.SelfSeparation(ARM, KEPT, [0, 1]), "pairs have the shape (2,), not (m, 2)"),
     (lambda: tasks.Momentum(target=3), "'momentum': target: expected 6 finite numbers"),
     (lambda: tasks.model_rows(ROBOT, 0.0), "period [s] = 0: expected a number > 0"),
     (lambda: Stack([HAND], A), "level must be 'velocity'"),
     (lambda: Stack([HAND], give=0.1), "give of a stack: expected a Mapping, got float 0.1"),
-    (lambda: Hierarchy.from_levels([(A, [None, 1])]), "b is not an array of numbers: list [None"),
     (lambda: Hierarchy.from_levels([(A, B)], names=np.array(1.0)), "expected a list of texts, got"),
-    (lambda: Hierarchy.from_levels([(A, B)], names=3), "names: expected a list of texts, got int"),
     (lambda: Hierarchy.from_levels([(A, B)], give=0.1), "give: expected a Sized, got float 0.1"),
     (lambda: Hierarchy.from_levels([(A, B)]).relaxed(0, B), "no level of the hierarchy gives"),
-    (lambda: Hierarchy.from_levels([(A, B)], give=[0.1]).relaxed(1, B),
-     "relaxed: level = 1: expected a whole number from 0 to 0"),
+    (lambda: Hierarchy.from_levels([(A, B)], give=[0.1]).relaxed(1, B), "relaxed: level = 1: expe"),
     (lambda: Hierarchy.from_levels([(A, B)]).upper_part(2), "2: expected a whole number fr"),
     (lambda: Hierarchy.from_levels([(A, B)]).upper_part(1, (B, B[:1])), "sides has shape (1,), e"),
     *((partial(setattr, Robot.named("kuka_lwr"), name, value), f"robot 'kuka_lwr': {name}{said}")
@@ -214,8 +211,7 @@ def limits(**settings):
     (lambda: Contact(FOOT, [(0, 0)]), "are not (k, 3) numbers"),
     (lambda: tasks.Friction(CONTACTS, 6), "faces = 6: expected one of 4, 8"),
     (lambda: tasks.Friction(CONTACTS, least=5.0, largest=5.0), "largest 5.0 N"),
-    (lambda: tasks.CentreOfPressure(Contacts(HUMANOID, [Contact(FOOT)])),
-     "no contact is a surface"),
+    (lambda: tasks.CentreOfPressure(Contacts(HUMANOID, [Contact(FOOT)])), "no contact is a surfa"),
     (lambda: Contact.rectangle(FOOT, 0.1, (0.0, 0.1)), "sole: x [m]: expected 2 finite numbers"),
     (lambda: Contact(FOOT, np.eye(3), slides=True), "3 points that slide; only a contact of one"),
     (lambda: tasks.Along(HAND, ((1, 0, 0), (1, 1, 0))), "'along': directions ((1, 0, 0), (1, 1"),
@@ -232,13 +228,10 @@ def limits(**settings):
     (lambda: Capsule("x", "hip", (0, 0, 0), (0, 0, 1), 1.0), "capsule 'x': joint = 'hip': expect"),
     (lambda: Loop(0.1, priority="high"), "loop: priority = 'high': expected a whole number"),
     (lambda: tasks.ContactForce(CONTACTS, "left_foot", (1.0, 2.0)), "is not 1, 3 or 6"),
-    (lambda: tasks.ContactMotion(CONTACTS, [np.eye(3)] * 3),
-     "anchors are not (4, 3) for each of 3"),
-    (lambda: tasks.ContactMotion(opening(), [np.eye(4, 3)] * 2, 9.0),
-     "opens, so its stiffness must be"),
+    (lambda: tasks.ContactMotion(CONTACTS, [np.eye(3)] * 3), "anchors are not (4, 3) for each of"),
+    (lambda: tasks.ContactMotion(opening(), [np.eye(4, 3)] * 2, 9.0), "opens, so its stiffness mu"),
     (lambda: tasks.Momentum("all"), "part = 'all': expected one of 'both', 'linear', 'angular'"),
     (lambda: tasks.Together([]), "there are no tasks in it"),
-    (lambda: tasks.TorqueLimits(HUMANOID), "give the contacts"),
     (lambda: Stack(level="torque"), "level 'torque' needs contacts, Contacts(robot) for none"),
     (lambda: Stack(contacts=CONTACTS), "contacts need the level 'torque', not 'acceleration'"),
     (lambda: Stack([tasks.Friction(CONTACTS)]), "task 'friction': contact forces need the level"),
@@ -279,14 +272,12 @@ def limits(**settings):
     *((lambda task=task: task.jacobian(state_at(STATE.q, STATE.v)), f"{len(task.points)} control "
        "points, and distances of 9")  # beyond the end of an array
       for task in (tasks.Avoidance(POINTS[:2]), tasks.CumulatedRepulsion(7, POINTS * 2, 0.1))),
-    (lambda: tasks.JointDamping(7, 1.0, "momentum"), "weight"),
     *((lambda asked=asked: asked(PANDA), "on joint 'joint_7', which is 'panda_joint7' of robot "
        "'panda': it is of another robot") for asked in (
-           HAND.error, Stack([HAND]).hierarchy, lambda state: state.position(FRAME))),
+           HAND.error, Stack([HAND]).hierarchy, methodcaller("position", FRAME))),
     (lambda: BARE.momentum, "robot 'so101' has no masses"),
-    (lambda: Stack([tasks.Momentum(name="spin")]).hierarchy(BARE), "task 'spin': robot 'so101' h"),
-    (lambda: Stack([tasks.Posture([0.0] * 5)], metric="mass").hierarchy(BARE),
-     "metric 'mass': robot 'so101' has no masses"),
+    (lambda: rows_of(tasks.Momentum(name="spin"), state=BARE), "task 'spin': robot 'so101' has no"),
+    (lambda: rows_of(tasks.Posture([0.0] * 5), state=BARE, metric="mass"), "metric 'mass': robot"),
     *((lambda span=span: Blended((0.0, span), CORNERS, span), "too near or too far apart, got 0.0")
       for span in (1e-300, 1e300)),
     (lambda: tasks.Manipulability(BARE.robot.frame("gripper"), 0.1, "pose").error(BARE),
@@ -296,20 +287,17 @@ def limits(**settings):
     (lambda: tasks.JointCoupling(ROBOT, {"joint_1": 0.0}), "no factor other than zero"),
     (lambda: tasks.Manipulability(FRAME, -0.1), "least = -0.1"),
     (lambda: limits(acceleration=1e-300), "limits[0]: acceleration times period 0.001 s squared "),
-    (lambda: limits(period=1e-300), "squared must be from 1e-100 to 1e+100, got 10.0"),
     (lambda: limits(period=1e100, acceleration=1.0), "acceleration times period 1e+100 s squared"),
     (lambda: limits(acceleration=0.0), "limits[0]: acceleration must be positive and finite, got"),
     (lambda: limits(acceleration=[1.0, 2.0]), "has shape (2,), expected a number or (7,)"),
     (lambda: limits(margin=2.2), "margin 2.2 leaves joint_2 no room between -2.094 and 2.094"),
     (lambda: Limits([0], [NAN], [1], [1], 1e-3), "limits[0]: no position lies between lower and u"),
     (lambda: Limits([0], [1], [0], [1], 1e-3), "limits[0]: velocity must be positive, got 0.0"),
-    (lambda: Stack([tasks.TorqueLimits(ROBOT)], "velocity").hierarchy(STATE),
-     "'torque limits': its rows are for the level acceleration or torque, not 'velocity'"),
+    (lambda: rows_of(tasks.TorqueLimits(ROBOT)), "for the level acceleration or torque, not 'vel"),
     *((lambda fraction=fraction: tasks.TorqueLimits(ROBOT, fraction),
        f"fraction = {fraction:g}: expected a finite number from 0 to 1")
       for fraction in (-1.0, 80.0)),
     (lambda: tasks.TorqueLimits(ROBOT, 0.0), "fraction 0.0 is not more than 0"),
-    (lambda: Blended(TIMES, CORNERS, 0.0), "blend 0.0 s must be at least 1e-100 s"),
     (lambda: Blended(TIMES, CORNERS, 1e-300), "blend 1e-300 s must be at least 1e-100 s"),
     (lambda: Blended(TIMES[:1], CORNERS, 0.1), "1 times for 2 points"),
     *((lambda bad=bad: Jittered(THERE, **{"amplitude": 0.1, "rate": 1.0, "seed": 0} | bad),
@@ -319,7 +307,6 @@ def limits(**settings):
     (lambda: circle((0, 0, 0), 0.1, (0, 0, 0)), "normal: tuple (0, 0, 0) is no direction"),
     (lambda: corners((0, 1), (0, 1), (0, 0, 0)), "sole: up: tuple (0, 0, 0) is no direction"),
     (lambda: Loop(0.0), "loop: period [s] = 0: expected"), (lambda: Loop(0.1, behind=0), "behind"),
-    (lambda: Loop(0.1, behind=2.5), "behind = 2.5: expected a whole number from 1 on"),
     (lambda: Loop(0.1, overrun="skipp"), "did you mean 'skip'"),
     (lambda: Loop(0.25, watchdog=0.1), "watchdog 0.1 s must be longer than the period 0.25 s"),
     (lambda: Loop(0.1).run(print, None, 1.0), "safe_stop: expected a function, got NoneType None"),
@@ -336,11 +323,10 @@ def limits(**settings):
     (lambda: tasks.Posture({"arm": 0.0}).dimension, "give Posture(..., robot=robot)"),
     (lambda: tasks.DangerBounds(LIMITS, ()), "expected at least one control point"),
     (lambda: tasks.DangerBounds(LIMITS, POINTS).box(STATE, "velocity"), "carries no measurement"),
-    *((lambda make=make: make(HUMANOID), "contact forces")
-      for make in (tasks.TorqueLimits, partial(tasks.TorqueStep, step=1.0))),
+    (lambda: tasks.TorqueLimits(HUMANOID), "torques depend on contact forces, so give the contac"),
+    (lambda: tasks.TorqueStep(HUMANOID, 1.0), "contact forces"),
     (lambda: tasks.TorqueStep(ROBOT, 0.0), "step = 0: expected a number > 0"),
-    (lambda: Stack([tasks.TorqueStep(ROBOT, 1.0)], "acceleration").hierarchy(STATE),
-     "'torque step': its rows are for the level torque, not 'acceleration'"),
+    (lambda: rows_of(tasks.TorqueStep(ROBOT, 1.0), "acceleration"), "level torque, not 'acceler"),
     (lambda: tasks.DangerBounds(tasks.JointLimits(HUMANOID, 5.0, 0.01), HUMANOID.control_points),
      "floating base"),
     *((lambda given=given: rows_after(given), f"'joint limits': state.commanded = {said}")
@@ -357,24 +343,22 @@ def limits(**settings):
     (lambda: LIMITS.limits.box(np.zeros(6), np.zeros(7), "velocity"), "7 finite numbers each"),
     (lambda: LIMITS.limits.clamp(np.zeros(7), np.zeros(7), "velocity", np.zeros(8)),
      "7 positions, 7 velocities and a command of shape (8,) for 7 joints"),
-    *((lambda task=task: Stack([HAND], "velocity", reference=task).hierarchy(STATE),
+    *((lambda task=task: rows_of(HAND, reference=task),
        f"{task.name!r}: the reference of a stack has a row for each joint")
-      for task in (tasks.Position(FRAME, THERE), LIMITS, tasks.JointCoupling(
-          ROBOT, {"joint_7": 1.0}))),
+      for task in (HAND, LIMITS)),
     *((lambda wrong=wrong: Given(wrong).error_reader(STATE)(), f"task 'given': error {said}")
       for wrong, said in ((None, "is not an array of numbers"), ("x", "is not an array of numb"),
                           ([1.0], "has shape (1,), expected (2,)"))),
-    (lambda: Stack([type("Nameless", (Kernel,), {"name": None})(abs)]),
-     "Nameless: name: expected a str, got NoneType None"),
-    *((lambda wrong=wrong: Stack([Given(**wrong)], "velocity").hierarchy(STATE), said)
+    (lambda: Stack([type("Nameless", (Kernel,), {"name": None})(abs)]), "Nameless: name: expected"),
+    *((lambda wrong=wrong: rows_of(Given(**wrong)), said)
       for wrong, said in (({"wrong": [1.0, 2.0, 3.0]}, "'given': error has shape (3,), expec"),
                           ({"wrong": [0.0, NAN]}, "task 'given', row 1: lower is nan"),
                           ({"J": np.eye(7)}, "jacobian has shape (7, 7), expected (2, 7)"),
                           ({"J": NAN * np.eye(2, 7)}, "task 'given', row 0: A[0, 0] is nan"),
                           ({"wrong": "a"}, "'given': error is not an array of numbers"),
                           ({"rate": [0.0]}, "'given': desired_velocity has shape (1,)"))),
-    (lambda: Stack([type("Plain", (Given,), {"kind": "Equality", "__init__": lambda _: None})()],
-                   "velocity").hierarchy(STATE), "task 'given': kind"),
+    (lambda: rows_of(type("Plain", (Given,), {"kind": "Equality", "__init__": lambda _: None})()),
+     "task 'given': kind"),
     *((lambda given=given: Kernel(given).error(STATE), f"'kernel': measure returned {said}")
       for given, said in ((abs, "builtin"), ((abs, ()), "tuple"), (None, "NoneType"))),
     (lambda: Activation(None, (), {"wall": 0.0}), "task 'wall': buffer = 0: expected"),
@@ -424,9 +408,7 @@ def limits(**settings):
         (lambda task: task.box(STATE, "speed"), "level = 'speed': expected one of 'velocity', 'ac"),
         (lambda task: task.clamp(STATE, "speed", A[0]), "level = 'speed': expected one of"),
         (lambda task: task.clamp(STATE, "velocity", "x"), "x is not an array of numbers: str 'x'"),
-        (lambda task: task.clamp(STATE, "velocity", [1.0]), "a command of shape (1,) for 7 joi"),
-        (lambda task: task.clamp(STATE, "velocity", A), "a command of shape (2, 2) for 7 joints"),
-        (lambda task: task.clamp(STATE, "velocity", None), "is not an array of numbers: Non"))),
+        (lambda task: task.clamp(STATE, "velocity", A), "a command of shape (2, 2) for 7 joi"))),
     (lambda: plugins.find("tasks", []), "plugins.find: name: expected a str, got list []"),
     (lambda: plugins.known("task"), "unknown group 'task'; did you mean 'tasks'?"),
     (lambda: Pairs(-1, 2), "pairs: points = -1: expected a whole number from 0 on"),

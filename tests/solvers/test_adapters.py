@@ -191,26 +191,21 @@ def test_limits_that_contradict_each_other_are_no_solution_and_named(configurati
         solve_ik(configuration, [posture_task(Q + 0.1)], DT, "weighted", constraints=hand)
 
 
-def test_rounding_in_a_row_of_a_limit_holds_no_joint(configuration):
-    """It froze the torso below a barrier for a frame on its axis."""
-    hand, bound = [frame_task(configuration)], limit((0, 70.0, 0.6))
-    free = solve_ik(configuration, hand, DT, limits=[bound])
-    faint = limit((2, 1e-15, 0.0), (2, -1e-15, 0.0))
-    np.testing.assert_allclose(solve_ik(configuration, hand, DT, limits=[faint, bound]), free,
-                               atol=1e-9)
-    assert abs(free[2]) > 1e-3
-
-
-def test_a_level_of_rounding_alone_changes_nothing(configuration):
-    """As of two frames that no joint moves apart: no answer was verified."""
+def test_rounding_in_a_limit_or_a_level_changes_nothing(configuration):
+    """The one froze the torso below a barrier for a frame on its axis; with the other, of two
+    frames that no joint moves apart, no answer was verified."""
     from pink.tasks import RelativeFrameTask
 
     fixed = RelativeFrameTask("end_effector", "joint_7", 1.0, 1.0)
     fixed.set_target(pin.SE3.Random())
     assert 0.0 < np.abs(fixed.compute_jacobian(configuration)).max() < 1e-12
-    hand = frame_task(configuration)
-    np.testing.assert_allclose(solve_ik(configuration, [fixed, hand], DT),
-                               solve_ik(configuration, [hand], DT), atol=1e-9)
+    hand, bound = [frame_task(configuration)], limit((0, 70.0, 0.6))
+    faint = limit((2, 1e-15, 0.0), (2, -1e-15, 0.0))
+    free = solve_ik(configuration, hand, DT, limits=[bound])
+    for tasks, limits in (hand, [faint, bound]), ([fixed, *hand], [bound]):
+        np.testing.assert_allclose(solve_ik(configuration, tasks, DT, limits=limits), free,
+                                   atol=1e-9)
+    assert abs(free[2]) > 1e-3
 
 
 def test_pinks_arguments_are_taken_in_pinks_order(configuration):

@@ -104,19 +104,15 @@ def test_f_and_g_are_those_of_the_matrix_made_from_the_rows(case):
 
 
 @pytest.mark.filterwarnings("ignore:overflow")  # of the kernels as plain Python
-@pytest.mark.parametrize("scale", [1e-300, 1e-160, 1.0, 1e150])
-def test_rows_of_any_size_are_met(scale):
-    A = np.array([[1.0, 2.0, 3.0], [0.0, 1.0, 1.0]])
-    res = Factorization([scale * A]).solve(np.array([scale, 0.0]))
-    assert res.status is Status.SOLVED
-    np.testing.assert_allclose(A @ res.x, [1.0, 0.0], atol=1e-12)
-
-
-@pytest.mark.parametrize("scale", [5e-324, 1e-200, 1e200, 1.7e308])
-def test_ranks_do_not_depend_on_the_size_of_rows(scale):
+@pytest.mark.parametrize("scale", [5e-324, 1e-300, 1e-200, 1e-160, 1.0, 1e150, 1e200, 1.7e308])
+def test_rows_of_any_size_have_their_rank_and_are_met_if_it_is_no_extreme(scale):
     """Squares that vanished counted as no rank, and those that overflowed warned."""
     A = scale * np.array([[1.0, 0.0], [0.0, 1.0], [1.0, -1.0]])
     assert Factorization([A[:1], A[1:], [[1.0, 2.0]], scale * np.eye(2)]).ranks == (1, 1, 0, 0)
+    if 1e-300 <= scale <= 1e150:
+        res = Factorization([A[1:]]).solve(np.array([scale, 0.0]))
+        assert res.status is Status.SOLVED
+        np.testing.assert_allclose(res.x, [1.0, 1.0], atol=1e-12)
 
 
 def test_rows_whose_squares_overflow_are_a_status_until_they_are_deleted():

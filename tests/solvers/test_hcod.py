@@ -7,7 +7,7 @@ import pytest
 from rank_cases import family, solved
 from refusals import refused
 
-from hierarchy import Hierarchy, HierarchyError
+from hierarchy import Hierarchy
 from solvers import Status, explain, make
 from solvers.explain import holders, is_missed
 from solvers.kernels.active_set.exact import solve_damped, solve_equalities, solve_hierarchy
@@ -49,43 +49,28 @@ def test_equalities_that_come_first_have_the_same_answer_from_a_smaller_kernel(m
     assert clear == 40 if damping else 0 < clear < 40
 
 
-@pytest.mark.parametrize("limit", [1, 3, 6, 11])
-def test_an_iteration_limit_keeps_the_levels_above_and_says_where_it_was(limit):
-    resolver = make("hcod", max_iterations=limit)
-    for h, _, norms in list(family("HUM38"))[:10]:
-        res = resolver.solve(h)
-        assert np.isfinite(res.x).all()
-        assert res.iterations <= limit
-        if res.status is Status.SOLVED:
-            assert res.unfinished is None
+@pytest.mark.parametrize("damping", [0.0, 0.05])
+def test_an_iteration_limit_keeps_the_levels_above_and_says_where_it_was(damping):
+    """With damping equalities below it were inactive, `unfinished` was 0, and where a solve took
+    its last iteration, it was not SOLVED."""
+    for h in (*(h for h, _, _ in list(family("HUM38"))[:10]), *map(structured, range(40))):
+        full = make("hcod", damping=damping).solve(h)
+        if full.status is not Status.SOLVED:
             continue
-        assert res.status is Status.ITERATION_LIMIT
-        k = res.unfinished
-        np.testing.assert_allclose(h.violations(res.x)[:k], norms[:k], atol=1e-8)
-        assert h.names[k] in explain(h, res)
-    apart = Hierarchy.from_levels([([[1.0], [-1.0]], [1.0, 1.0], [2.0, 2.0])])
-    assert make("hcod", max_iterations=1).solve(apart).unfinished == 0
-
-
-def test_with_damping_an_iteration_limit_is_reported_as_without():
-    """Equalities below the limit were inactive, and `unfinished` was 0."""
-    for h in map(structured, (2, 5, 7)):
-        for limit in range(1, make("hcod", damping=0.05).solve(h).iterations):
-            res = make("hcod", damping=0.05, max_iterations=limit).solve(h)
+        for limit in {1, 3, 6, 11, full.iterations - 1} & {*range(1, full.iterations)}:
+            res = make("hcod", damping=damping, max_iterations=limit).solve(h)
             assert (res.status, res.iterations) == (Status.ITERATION_LIMIT, limit)
             assert (res.active == EQUAL)[h.lower == h.upper].all()
-            assert 0 < res.unfinished < len(h.sizes)
-
-
-@pytest.mark.parametrize("damping", [0.0, 0.05])
-def test_a_solve_with_the_budget_that_it_needs_is_solved(damping):
-    """A last level with damping was ITERATION_LIMIT where it took the last iteration."""
-    for seed in range(40):
-        h = structured(seed)
-        res = make("hcod", damping=damping).solve(h)
-        if res.status is Status.SOLVED:
-            again = make("hcod", damping=damping, max_iterations=res.iterations).solve(h)
-            assert (again.status, *again.x) == (res.status, *res.x)
+            k = res.unfinished
+            assert h.names[k] in explain(h, res)
+            assert k > 0 or limit < 3, "the first levels take no more iterations"
+            if damping == 0.0:
+                np.testing.assert_allclose(h.violations(res.x)[:k], h.violations(full.x)[:k],
+                                           atol=1e-8)
+        res = make("hcod", damping=damping, max_iterations=full.iterations).solve(h)
+        assert (res.status, res.unfinished, *res.x) == (Status.SOLVED, None, *full.x)
+    apart = Hierarchy.from_levels([([[1.0], [-1.0]], [1.0, 1.0], [2.0, 2.0])])
+    assert make("hcod", max_iterations=1).solve(apart).unfinished == 0
 
 
 @pytest.mark.parametrize(("kind", "seed", "budget"), [
@@ -99,21 +84,6 @@ def test_slices_of_a_budget_end_with_the_answer_of_one_solve(kind, seed, budget)
         res, slices = part.solve(h, res.memory), slices + 1
     assert (res.status, slices > 1) == (Status.SOLVED, True)
     np.testing.assert_allclose(res.x, HCOD.solve(h).x, atol=1e-9)
-
-
-def test_the_rounding_of_a_heavy_row_is_not_held_against_a_light_one():
-    """The last row is met; its residual of 2e-16 times 1024 alone pulls the second unknown."""
-    A = [[96.0, 0.0], [3 / 256, 0.0], [384.0, 0.0], [2048.0, -1024.0]]
-    lower, upper = [-64.0, -np.inf, 128.0, -3072.0], [0.0, -1 / 256, 128.0, -3072.0]
-    h = Hierarchy.from_levels([(A, lower, upper)])
-    res = HCOD.solve(h)
-    assert res.status is Status.SOLVED
-    assert res.verified(h)
-
-
-def test_rounding_does_not_begin_the_series_that_the_search_compares():
-    """Rows that are met in a level that others miss: their residuals of 1e-17 were compared."""
-    assert HCOD.solve(generate(961_000_691)).status is Status.SOLVED
 
 
 @pytest.mark.parametrize("seed", [5, 9])
@@ -141,15 +111,14 @@ def test_a_solved_answer_is_verified_from_its_active_rows_and_no_other_is():
     assert not res.verified(BOX.changed(upper=BOX.upper + 0.1 * (BOX.upper > BOX.lower)))
     for x, memory in ((res.x + 1e-6, res.memory), (res.x, none)):
         assert not type(res)(x, res.status, memory).verified(BOX)
-    with pytest.raises(HierarchyError, match=r"certify\(h, x\)"):
-        make("weighted").solve(BOX).verified(BOX.changed(metric=np.eye(3)))
+    refused("certify(h, x)", make("weighted").solve(BOX).verified, BOX.changed(metric=np.eye(3)))
     fewer = BOX.upper_part(1)
     refused("verified: active has shape (5,), expected (3,)", res.verified, fewer)
     refused("explain: active has shape (5,), expected (3,)", explain, fewer, res)
     refused("rank_tolerance = nan", res.verified, BOX, rank_tolerance=np.nan)
 
 
-X, Y = ([[1.0, 0.0]], [0.0]), ([[0.0, 1.0]], [0.0])
+X, Y, TURN = ([[1.0, 0.0]], [0.0]), ([[0.0, 1.0]], [0.0]), np.arange(4) * np.pi / 2.0
 EXPLAINED = {
     "a box": ([(np.eye(2), [-1.0] * 2, [1.0] * 2), ([[1.0, 0.5]], [3.0])],
               ["level 1 is met.", "level 2 is missed by 1.5: held back by level 1 row 0 at its "
@@ -177,6 +146,10 @@ EXPLAINED = {
          ([[1.0, 0.2]], [9.0])],
         [..., "level 2 is met.", "level 3 is missed by 4: held back by level 1 at its upper side.",
          "level 4 is missed by 7.6: held back by level 2 and level 3."]),
+    "rows that give by rounding, 1e-16 of 0": (
+        [(np.array([np.cos(TURN), np.sin(TURN)]).T, [-np.inf] * 4, [-0.5] * 4),
+         (np.eye(2), [1.0, 0.0])],
+        ["level 1 is missed by 1, of which 1 cannot be avoided.", ...], [0.0, 0.2, 0.0, 0.0], 0.0),
     "no joint moves it: singular": (
         [([[0.0, 0.0], [0.6, 0.3], [0.8, 0.4]], [-0.5, 0.6, 0.8])],  # x, y, z of a straight arm
         ["level 1 is missed by 0.5: singular here: no joint moves level 1 along row 0."])}
@@ -184,8 +157,8 @@ EXPLAINED = {
 
 @pytest.mark.parametrize("case", EXPLAINED)
 def test_explain_says_what_holds_a_level_back(case):
-    levels, said = EXPLAINED[case]
-    h = Hierarchy.from_levels(levels)
+    levels, said, *give = EXPLAINED[case]
+    h = Hierarchy.from_levels(levels, give=give or None)
     lines = explain(h, HCOD.solve(h)).splitlines()
     assert lines == [line if words is ... else words
                      for line, words in zip(lines, said, strict=True)]
@@ -209,66 +182,20 @@ def test_what_is_named_alone_holds_a_level_back(kind):
                     violations[k], rel=1e-6)
 
 
-def test_a_level_that_is_rounding_beside_others_counts_where_limits_hold_x():
-    """Recorded in an example of pink: a vertical motion of an arm that moves in a plane."""
-    limits, lifted = (np.eye(2), [-2.0] * 2, [2.0] * 2), ([[2.56e-18, 1.8e-18]], [-700.0])
-    h = Hierarchy.from_levels([limits, lifted])
-    res = solved(HCOD, h)
-    np.testing.assert_array_equal(res.x, [-2.0, -2.0])
-    assert res.verified(h)
-    free = HCOD.solve(Hierarchy.from_levels([([[1.0, 0.0]], [0.5]), lifted]))
-    assert free.status is Status.INACCURATE
-    np.testing.assert_array_equal(free.x, [0.5, 0.0])
-
-
-def test_a_sign_that_hangs_on_the_rounding_of_a_violated_row_is_left_to_the_levels_below():
-    """The first two rows differ by 3e-13 rad: no reason to hold the third against a level below."""
-    level = [[0.15 - 4.5e-14, 0.15], [-0.45, -0.45], [0.006, -0.162]], [0.05, 0.015, 0.05]
-    res = HCOD.solve(Hierarchy.from_levels([(*level, [np.inf] * 3), ([[0.2, 0.0]], [0.1])]))
-    assert (res.status, res.x[0]) == (Status.SOLVED, pytest.approx(0.5))
-
-
-@pytest.mark.parametrize("speed", np.linspace(0.2, 2.0, 10))
-def test_an_arm_that_is_straight_but_for_seven_digits_of_pi_is_solved_above_its_posture(speed):
-    """Sawyer at its start: the first two rows, along an axis of the base, differ by 2e-7 rad."""
-    e = 1.8e-7
-    hand = [[-0.1603, 0.0, -e, 0.0, -e, 0.0, -e, 0.0], [1.0155, 0.0, 0.0, e, 0.0, e, 0.0, 0.0],
-            [0.0, 0.0, -0.9345, -0.0322, -0.5345, 0.1363, -0.1345, 0.0]]
-    solved(HCOD, Hierarchy.from_levels([
-        (np.eye(8), [-20.0] * 8, [20.0] * 8), (hand, [0.0, 0.0, speed]), (np.eye(8), [0.0] * 8)]))
-
-
-@pytest.mark.parametrize("seed", [1010000011, 1010000109, 1010000484, 1010000703,
-                                  1007015786, 1008029551])
-def test_rows_nearly_parallel_leave_the_signs_of_others_known(seed):
-    """Multipliers of 1e7 round off by 1e-8 of the level: INACCURATE, and x off by up to 0.5.
-
-    In the last two another row was off its side by less than is forgiven.
-    """
-    h = structured(seed, ("nearly_parallel",))
-    res = HCOD.solve(h)
-    assert res.status is Status.SOLVED
-    proof = prove(h, [res.x])
-    assert proof.posed > len(h.sizes)
-    np.testing.assert_allclose(res.x, proof.x, rtol=0.0, atol=1e-7 * (1.0 + np.abs(proof.x).max()))
-
-
-@pytest.mark.parametrize("seed", [1010000010, 1010000106, 1010000358, 1010000425])
-def test_a_dependent_row_is_cut_however_small_the_pivots_of_others_are(seed):
-    """Rows at 2e-9 to 9e-9 rad were INACCURATE where others were at less than 5,000 times that."""
+@pytest.mark.parametrize("seed", [
+    # Multipliers of 1e7 round off by 1e-8 of the level: INACCURATE, and x off by up to 0.5.
+    1010000011, 1010000109, 1010000484, 1010000703,
+    # In these another row was off its side by less than is forgiven.
+    1007015786, 1008029551,
+    # Rows at 2e-9 to 9e-9 rad were INACCURATE where others were at less than 5,000 times that.
+    1010000010, 1010000106, 1010000358, 1010000425])
+def test_rows_nearly_parallel_are_solved_as_is_proved(seed):
     h = structured(seed, ("nearly_parallel",))
     res = HCOD.solve(h)
     proof = prove(h, [res.x])
-    assert (res.status, proof.complete, proof.turn > 1e-9) == (Status.SOLVED, True, True)
+    assert (res.status, proof.complete) == (Status.SOLVED, True)
     for x in (res.x, HCOD.solve(h, res.memory).x):
-        np.testing.assert_allclose(x, proof.x, rtol=0.0, atol=1e-7)
-
-
-@pytest.mark.parametrize("seed", [1006200299, 1008024437, 1009027092])
-def test_signs_that_rounding_of_large_multipliers_may_decide_are_inaccurate(seed):
-    """Without that x was SOLVED, and the last level, or the reference, missed by 1e-5 and more."""
-    assert HCOD.solve(structured(seed, ("nearly_parallel",))).status is Status.INACCURATE
-
+        assert np.abs(x - proof.x).max() <= 5e-8 * max(1.0, np.abs(proof.x).max())
 
 def test_rows_whose_sides_cross_are_all_that_is_said():
     h = Hierarchy.from_levels([(np.eye(2), [0.0, 0.0], [1.0, 1.0])], names=["box"])
@@ -338,17 +265,3 @@ def test_a_factor_of_all_rows_changes_nothing(power):
                                       h.reference)
         res, again = HCOD.solve(h), HCOD.solve(other)
         assert (again.status, again.iterations, *again.x) == (res.status, res.iterations, *res.x)
-
-
-@pytest.mark.filterwarnings("ignore:overflow")
-@pytest.mark.parametrize("below", [0, 1])
-def test_rows_of_any_size_are_solved_and_numbers_that_overflow_are_a_failure(below):
-    tiny = Hierarchy.from_levels([([[1e-200]], [1e-200], [np.inf if below else 1e-200])])
-    np.testing.assert_array_equal(HCOD.solve(tiny).x, [1.0])
-    small = Hierarchy.from_levels([([[1e-150, 0.0], [0.0, 2e-150]], [1e-150] * 2, [1e-150, 3e-150]),
-                                   ([[1e-150, 1e-150]], [4e-150])])
-    np.testing.assert_allclose(HCOD.solve(small).x, [1.0, 1.5])
-    large = Hierarchy.from_levels([(np.eye(2), np.zeros(2), np.ones(2)),
-                                   ([[1.0, 1.0], [1.0, 2.0]], [1e154, 2e154])])
-    res = HCOD.solve(large)
-    assert (res.status, res.x.any()) == (Status.NUMERICAL_FAILURE, False)

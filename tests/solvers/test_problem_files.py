@@ -188,18 +188,15 @@ def test_what_is_no_file_of_problems_is_refused(tmp_path):
     refused("read: expected a path, got int 3", read, 3)
 
 
-def test_a_seed_that_is_none_is_named():
-    for make_one in (structured, partial(problems.family, "EQ7"),
-                     partial(problems.bounded, structured(0))):
-        refused("seed = -1: expected a whole number", make_one, -1)
-
-
-@pytest.mark.parametrize(("knob", "value"), [
-    ("joints", (0, 5)), ("joints", (5, 2)), ("rows", (-1, 3)), ("spread", 0.5), ("ties", 1.5),
-    ("scales", (1.0, np.inf)), ("empty", float("nan")),
-    ("joints", None), ("equalities_only", 1)])
-def test_a_knob_out_of_range_is_named(knob, value):
-    refused(f"recipe: {knob}", Recipe, **{knob: value})
+@pytest.mark.parametrize(("make_one", "wrong", "said"), [
+    *((made, -1, "seed = -1: expected a whole number") for made in (
+        structured, partial(problems.family, "EQ7"), partial(problems.bounded, structured(0)))),
+    *((lambda wrong, knob=knob: Recipe(**{knob: wrong}), wrong, f"recipe: {knob}")
+      for knob, wrong in (
+          ("joints", (0, 5)), ("joints", (5, 2)), ("rows", (-1, 3)), ("spread", 0.5), ("ties", 1.5),
+          ("scales", (1.0, np.inf)), ("empty", np.nan), ("joints", None), ("equalities_only", 1)))])
+def test_a_seed_or_a_knob_out_of_range_is_named(make_one, wrong, said):
+    refused(said, make_one, wrong)
 
 
 @settings(max_examples=50, deadline=None, derandomize=True)

@@ -194,32 +194,24 @@ def test_joints_that_no_task_moves_do_not_hide_the_answer_behind_light_rows():
         assert replace(settled("hand", "elbow"), geared=True).solve(h).status is Status.SOLVED
 
 
-@pytest.mark.parametrize("inner", ["hcod", "hqp"])
-def test_rows_of_any_size_end_in_a_status(inner):
-    """Divisions of 0 by 0 and overflow in a direction of length 1 ended the loop."""
-    sizes = [1.0, 1e-12, 1e-160, 1e8, 1e150, 1e200]
+@pytest.mark.parametrize(("inner", "bad"), [
+    ("hcod", None), ("hqp", None), ("hcod", np.nan), ("hcod", INF), ("hcod", 1e308)])
+def test_rows_of_any_size_end_in_a_status_and_those_that_are_no_numbers_at_once(inner, bad):
+    """Divisions of 0 by 0, overflow in a direction of length 1, and LAPACK, where singular values
+    of such rows were asked for, ended the loop or never came back."""
+    resolver = replace(settled(*"abc", inner=inner), bends={"b": 1.0, "c": 0.5})
     for seed in range(60):
         rng = np.random.default_rng(seed)
+        sizes = [1.0, 1e-12, 1e-160, 1e8, 1e150, 1e200] if bad is None else [1.0]
         levels = [(rng.normal(size=(2, 4)) * rng.choice(sizes, size=(2, 1)),
                    rng.normal(size=2) * rng.choice([1.0, 1e-8, 1e150])) for _ in range(3)]
         levels[1] = (*levels[1], np.full(2, INF))
-        h = Hierarchy.from_levels(levels, names=["a", "b", "c"])
-        resolver = replace(settled("a", "b", "c", inner=inner), bends={"b": 1.0, "c": 0.5})
-        assert np.isfinite(resolver.solve(h).x).all()
-
-
-@pytest.mark.parametrize("bad", [np.nan, INF, 1e308])
-def test_rows_that_are_no_numbers_end_in_a_status_at_once(bad):
-    """LAPACK raised, or never came back, where singular values of such rows were asked for."""
-    for seed in range(20):
-        rng = np.random.default_rng(seed)
-        h = Hierarchy.from_levels([(rng.normal(size=(2, 4)), 9.0 * rng.normal(size=2)),
-                                   (rng.normal(size=(2, 4)), np.ones(2), np.full(2, INF)),
-                                   (rng.normal(size=(3, 4)), rng.normal(size=3))], names=[*"abc"])
-        h.A[rng.integers(7)] = bad
-        res = replace(settled("a", "b", "c"), bends={"b": 1.0}).solve(h)
-        assert res.status is Status.NUMERICAL_FAILURE
-        assert not res.x.any()
+        h = Hierarchy.from_levels(levels, names=[*"abc"])
+        if bad is not None:
+            h.A[rng.integers(6)] = bad
+        res = resolver.solve(h)
+        assert np.isfinite(res.x).all()
+        assert bad is None or (res.status, res.x.any()) == (Status.NUMERICAL_FAILURE, False)
 
 
 def test_a_level_may_have_the_name_of_what_is_put_above_it():
@@ -287,34 +279,26 @@ def by_simetti_and_casalino(levels, n):
     return rho
 
 
-def solved(levels, acts):
-    return SMOOTH.solve_activated(Hierarchy.from_levels(levels), np.concatenate(acts))
-
-
-def test_the_answer_is_that_of_the_paper_with_all_its_matrices():
+def smooth_problems():
+    """Yield levels (J, rate) and activations of their rows, the last few near a singularity."""
     rng = np.random.default_rng(3)
     for _ in range(60):
         sizes = rng.integers(1, 5, 3)
-        levels = [(rng.normal(size=(m, 7)), rng.normal(size=m)) for m in sizes]
-        acts = [np.where(rng.random(m) < 0.5, rng.choice([0.0, 1.0], m), rng.random(m))
-                for m in sizes]
-        want = by_simetti_and_casalino(
-            [(J, a, rate) for (J, rate), a in zip(levels, acts, strict=True)], 7)
-        found = solved(levels, acts)
+        yield [(rng.normal(size=(m, 7)), rng.normal(size=m)) for m in sizes], [
+            np.where(rng.random(m) < 0.5, rng.choice([0.0, 1.0], m), rng.random(m)) for m in sizes]
+    for scale in (1e-1, 1e-2, 1e-3, 0.0):
+        J, row, other = rng.normal(size=(3, 1, 4))
+        J = np.vstack([row, row + scale * J])
+        yield [(J, rng.normal(size=2)), (other, np.ones(1))], [np.array([1, 0.7]), np.ones(1)]
+
+
+def test_the_answer_is_that_of_the_paper_with_all_its_matrices_also_near_a_singularity():
+    for levels, acts in smooth_problems():
+        want = by_simetti_and_casalino([(J, a, rate) for (J, rate), a in zip(
+            levels, acts, strict=True)], levels[0][0].shape[1])
+        found = SMOOTH.solve_activated(Hierarchy.from_levels(levels), np.concatenate(acts))
         assert found.status is Status.SOLVED
         np.testing.assert_allclose(found.x, want, atol=1e-7 * (1 + np.abs(want).max()))
-
-
-def test_near_a_singularity_it_is_regularised_as_in_the_paper():
-    rng = np.random.default_rng(4)
-    for scale in (1e-1, 1e-2, 1e-3, 0.0):
-        row = rng.normal(size=(1, 4))
-        J = np.vstack([row, row + scale * rng.normal(size=(1, 4))])
-        levels, acts = [(J, rng.normal(size=2)), (rng.normal(size=(1, 4)), [1.0])], [[1, 0.7], [1]]
-        want = by_simetti_and_casalino([(*levels[0][:1], np.array(acts[0]), levels[0][1]),
-                             (levels[1][0], np.ones(1), np.ones(1))], 4)
-        np.testing.assert_allclose(solved(levels, list(map(np.array, acts))).x, want,
-                                   atol=1e-6 * (1 + np.abs(want).max()))
         assert np.abs(want).max() < 1e4
 
 

@@ -3,7 +3,8 @@
 import subprocess
 import sys
 import warnings
-from threading import Event, Thread
+from concurrent.futures import ThreadPoolExecutor
+from threading import Event
 
 import numpy as np
 import pytest
@@ -155,15 +156,12 @@ def test_solves_in_two_threads_leave_the_filters_of_warnings_as_they_were(monkey
     none = refinement.Rows.none(1)
     program = programs.null_space_program(none, none, none, 1.0, None)
 
-    def solve():
+    def solve(_):
         program.solve(backends.backend_of("proxqp"))
         left.set()
 
-    threads = [Thread(target=solve) for _ in range(2)]
-    for thread in threads:
-        thread.start()
-    for thread in threads:
-        thread.join()
+    with ThreadPoolExecutor(2) as threads:
+        list(threads.map(solve, range(2)))
     assert warnings.filters == filters
 
 
