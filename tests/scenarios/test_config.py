@@ -122,15 +122,6 @@ def test_a_stack_that_asks_for_nothing_is_refused(tmp_path):
     refused("scenario 'idle': the stack is empty", lambda: build(load(path)), error=ScenarioError)
     posture = load(path, ["control.stack=hierarchical", "posture.role=task"])
     assert build(posture).stack.names == ("posture",)
-    refused("2 tasks are named 'a_b'", load, path, [  # the errors of both would be one signal
-        "control.stack=hierarchical",
-        "tasks=[{kind='posture', name='a b'}, {kind='com', name='a_b'}]"])
-    # and here one metric, as below
-    refused("task 'a': another one has the name of its rotation, 'a turned'", load, path, [
-        "control.stack=hierarchical",
-        "tasks=[{kind='pose', name='a', frame='tool0'}, {kind='com', name='a turned'}]"])
-    refused("2 tasks are named 'joint_limits'", lambda: build(load("reach-torque", [
-        "tasks.0.name=joint_limits"])), error=ScenarioError)
 
 
 def test_waypoints_of_obstacles_vary_within_their_spread_and_half_the_time_beside_them():
@@ -160,16 +151,6 @@ def test_every_key_has_a_meaning_and_the_page_of_keys_is_as_the_program_has_them
 
     assert scenario_keys.written() == scenario_keys.PAGE.read_text(encoding="utf-8"), (
         "run `python docs/_ext/scenario_keys.py`")
-
-
-@pytest.mark.parametrize(("key", "said"), [
-    ("plant.kind", '[plant]\n  kind: default "kinematic"\n      "kinematic": Follows its '),
-    ("tasks.0.path.kind", '[tasks.path]\n  kind: required\n      "still": A point that'),
-    ("kind", "kind is a key of several sections:\n  plant.kind\n  sensor.kind\n  pointing.kind\n"
-             "  avoidance.kind\n"),
-    ("pointing.kind", '[pointing]\n  kind: "equality", "inequality", default "inequality"\n')])
-def test_a_kind_is_explained_by_those_there_are(key, said, command):
-    assert command("help", key).out.startswith(said)
 
 
 def test_compare_runs_a_group_side_by_side_each_scenario_with_its_own_resolver(

@@ -140,8 +140,6 @@ def test_collision_says_where_in_the_list_the_obstacles_come(tmp_path):
     assert later.stack.names == ("position", "separation", "coupling")
     assert isinstance(later.stack["separation"], Separation)
     assert later.tasks.give == {"separation": 0.01}
-    refused("tasks.0: name = 'hands'", scenario_of, tmp_path, {**listed, "name": "hands"},
-            avoidance=avoidance)
 
 
 def test_a_recorded_path_is_followed(tmp_path):

@@ -143,14 +143,12 @@ def test_a_file_alone_loads_no_code(what, command, folder):
     assert "plugin 'doors_of_mine' cannot be imported: ZeroDivisionError" in text
 
 
-def test_the_kinds_of_a_plugin_are_explained_and_a_wrong_key_meets_only_its_own(command):
+def test_the_kinds_of_a_plugin_are_explained(command):
     said = command("help elbow --plugin doors_of_mine").out
     assert said.startswith('[[tasks]] with kind = "elbow"')
     assert "  joint: string, required" in said
     assert "  gain: number, default 2.0" in said
     assert '\n      "elbow": ' in command("help tasks.kind --plugin doors_of_mine").out
-    said = command("check own.toml --plugin doors_of_mine --set tasks.0.joynt=1", code=2).err
-    assert "unknown key 'tasks.0.joynt'; did you mean 'tasks.0.joint'? Known: angle," in said
 
 
 @pytest.mark.parametrize(("annotation", "value", "made"), [
@@ -274,7 +272,9 @@ def test_arrays_that_a_plugin_keeps_and_overwrites_are_its_own(command, folder):
     ("yield Metric('stack_changes', 'S', 77.0, '')", "metrics 'own' are left out: others yield "
      "'stack_changes' too"),
     ("yield from [Metric('own', 'O', 77.0, '')] * 2", "are left out: others yield 'own' too"),
-    ("yield recording['q'].mean()", "what it yields[0]: expected a Metric, got float64")])
+    ("yield recording['q'].mean()", "what it yields[0]: expected a Metric, got float64"),
+    ("yield Metric('own', 'O', np.nan, '')", "'own': value = nan: expected a finite number"),
+    ("yield Metric('own', 'O', 77.0, None)", "'own': unit: expected a str")])
 def test_metrics_that_fail_are_left_out_and_the_run_is_kept(body, said, command, folder):
     with_plant(folder, '"odd"')
     with (folder / "doors_of_mine.py").open("a") as module:
@@ -313,9 +313,8 @@ def test_a_scenario_with_own_kinds_is_copied_and_pickled(folder):
 
 
 @pytest.mark.parametrize(("change", "said"), [
-    ("tasks.0.angel=1.0", "unknown key 'tasks.0.angel'; did you mean 'tasks.0.angle'?"),
+    ("tasks.0.angel=1", "unknown key 'tasks.0.angel'; did you mean 'tasks.0.angle'? Known: angle,"),
     ("tasks.0.angle=true", "tasks.0.angle: Input should be a valid number, got True"),
-    ("tasks.2.angle=1.0", "[tasks] has 2 entries, numbered from 0, and no '2'"),
     ("tasks.1.path.kind=spiral", "tasks.1.path: unknown kind 'spiral'. Known: circle"),
     ("tasks.0.kind=elbwo", "tasks.0: unknown kind 'elbwo'; did you mean 'elbow'?"),
     ("control.resolver=havled", "unknown resolver 'havled'; did you mean 'halved'?"),
@@ -353,8 +352,9 @@ def test_a_name_of_an_entry_point_is_found_without_being_imported_first(group, l
      "callable object"),
     ("register('robots', 'odd')(lambda: 1 / 0)", "robot.model=odd", "robot 'odd' of a plugin: "
      "ZeroDivisionError: division by zero"),
-    ("register('resolvers', 'odd')(lambda: make('hcod'))", "control.resolver=odd", "resolver 'odd' "
-     "of a plugin: expected a class of Resolver, got function"),
+    *((f"register('resolvers', 'odd')({made})", "control.resolver=odd", "resolver 'odd' of a "
+       f"plugin: expected a class of Resolver, got {got}")
+      for made, got in (("lambda: make('hcod')", "function"), ("int", "type"))),
     ("register('resolvers', 'odd')(type('Odd', (Halved,), {'__post_init__': lambda self: 1 / 0}))",
      "control.resolver=odd", "resolver 'odd': ZeroDivisionError: division by zero"),
     ("register('resolvers', 'odd')(type('Odd', (Halved,), {'accuracy': float('nan')}))",
@@ -384,6 +384,8 @@ def test_what_is_registered_and_no_such_thing_is_named(line, change, said, folde
     ("register('robots', 'kuka_lwr')(my_arm)", "robots: 'kuka_lwr' is already"),  # this too
     ("from solvers.resolver import register as add; Halved.name = 'hcod'; add(Halved)",
      "resolvers: 'hcod' is already solvers.resolvers.hcod.Hcod"),  # took the place of hcod
+    ("register('tasks', 'elbow')(Weak)", "tasks: 'elbow' is already"),
+    ("register('task', 'odd')", "unknown group 'task'; did you mean 'tasks'"),
     ("register('tasks', 'odd')(None)", "tasks: 'odd' is None"),
     ("register('tasks', Weak)", "tasks: name: expected a str, got type"),
     ("from scenarios.recording.signals import Signal; Signal('odd', 'Pa', (3,), '')",
@@ -408,11 +410,3 @@ def test_a_figure_that_fails_is_left_out_of_the_page(command, folder, undrawn):
         command("compare own.toml --plugin doors_of_mine --resolvers hcod,tpm --out a --workers 1 "
                 "--set robot.model=same")
     assert "Side by side" in (folder / "a" / "index.html").read_text()
-
-
-def test_two_things_of_one_name_are_refused():
-    plugins.register("tasks", "thing")(type("One", (), {}))
-    refused("tasks: 'thing' is already", plugins.register("tasks", "thing"), type("Two", (), {}))
-    refused("unknown group 'task'; did you mean 'tasks'", plugins.register, "task", "thing")
-    plugins.register("resolvers", "whole")(int)
-    refused("resolver 'whole' of a plugin: expected a class of Resolver", make, "whole")

@@ -21,7 +21,6 @@ from scenarios.cell.plants.torque import TorqueRobot, inside
 from scenarios.config import ScenarioError
 from scenarios.config.sections.plant import PushSection, TorqueSection
 from scenarios.export import export
-from scenarios.loop.first_tick import first_tick
 from scenarios.measure.metrics import measure
 from scenarios.measure.safety import standing
 
@@ -224,13 +223,6 @@ def tilted(degrees):
     ids=["a little", "a little above", "open at the start"])
 def test_what_comes_down_within_a_few_ticks_or_later_is_not_refused(keys):
     build(changed(keys))
-
-
-def test_a_floor_with_less_friction_than_the_controller_counts_on_is_named():
-    found = first_tick(changed({"plant.friction": 0.4, "contacts.1.friction": 0.3})).warnings
-    assert [line for line in found if "friction" in line] == [
-        "contact 'left_foot': the controller counts on a friction of 0.7, and the plant has 0.4 "
-        "(plant.friction): it may slip"]
 
 
 def test_a_contact_may_be_called_as_something_else_in_the_scene():
