@@ -22,12 +22,16 @@ MODULE = '''
 from dataclasses import dataclass
 from typing import ClassVar
 
-from hierarchy import Robot
+import numpy as np
+from hierarchy import Robot, Task
 from hierarchy.paths import Path
 from hierarchy.plugins import register
 from hierarchy.robot import Frame
 from hierarchy.tasks import JointCoupling, Position
 from scenarios.cell.plants import KinematicArm
+from scenarios.draw.figures.panels import Panel
+from scenarios.measure.metrics import Metric
+from scenarios.recording.signals import Signal
 from solvers import Resolution, Resolver, make
 
 @register("tasks", "elbow")
@@ -60,11 +64,6 @@ class Weak(KinematicArm):
 
     def act(self, command):
         super().act(self.share * command)
-'''
-
-BRITTLE = '''
-import numpy as np
-from hierarchy import Task
 
 @register("tasks", "brittle")
 @dataclass(frozen=True)
@@ -83,11 +82,6 @@ class Brittle(Task):
 
     def jacobian_derivative(self, state):
         return np.zeros((1, 7))
-'''
-
-ODD = '''
-import numpy as np
-from scenarios.measure.metrics import Metric
 
 @register("plants", "odd")
 class Odd(KinematicArm):
@@ -105,9 +99,7 @@ class Odd(KinematicArm):
 @register("plants", "none")
 def none():
     return None
-'''
 
-KEPT = '''
 X = np.zeros(7)
 
 @register("resolvers", "kept")
@@ -128,6 +120,12 @@ def folder(tmp_path, monkeypatch, no_plugins):
     monkeypatch.chdir(tmp_path)
     yield tmp_path
     sys.modules.pop("doors_of_mine", None)
+
+
+def add(text, folder):
+    """Add lines to the plugin."""
+    with (folder / "doors_of_mine.py").open("a") as module:
+        module.write(f"\n{text}\n")
 
 
 @pytest.mark.parametrize("what", ["check", "run", "compare"])
@@ -158,20 +156,16 @@ def test_the_kinds_of_a_plugin_are_explained(command):
     ("float | None", '"5"', "tasks.1.x: Input should be a valid number, got '5'"),  # was 5.0
     ("dict[str, float]", "{a = true}", "tasks.1.x.a: Input should be a valid number, got True")])
 def test_keys_that_may_be_left_out_or_are_lists_are_read_as_others(annotation, value, made, folder):
-    (folder / "doors_of_mine.py").write_text(MODULE + f"""
-@register("tasks", "shown")
-def shown(x: {annotation} = None):
-    raise ValueError(repr(x))
-""")
+    add(f'@register("tasks", "shown")\ndef shown(x: {annotation} = None):\n'
+        "    raise ValueError(repr(x))", folder)
     plugins.allow("doors_of_mine")
     refused(made, lambda: simulate(load("own.toml", [
         f"tasks.1={{kind = 'shown', x = {value}}}"])))
 
 
 def test_the_error_of_a_task_of_a_plugin_has_the_unit_that_its_class_says(folder):
-    file, scenario = folder / "doors_of_mine.py", folder / "own.toml"
-    file.write_text(MODULE + BRITTLE.replace("dimension = 1", 'dimension = 1\n    unit = "kg"\n'
-                                             '    kind = "inequality"'))
+    add("Brittle.unit, Brittle.kind = 'kg', 'inequality'", folder)
+    scenario = folder / "own.toml"
     scenario.write_text(scenario.read_text().replace('"halved"', '"hcod"')
                         + '[[tasks]]\nkind = "brittle"\nsince = 9.0\n')
     plugins.allow("doors_of_mine")
@@ -203,7 +197,6 @@ def test_the_plant_and_the_resolver_of_a_plugin_do_what_they_say():
     ("exit('bye')", "task 'brittle': SystemExit: bye ({file}, line {line})")])
 def test_a_task_that_fails_is_named_and_what_was_run_is_kept(fault, said, command, folder):
     file, scenario = folder / "doors_of_mine.py", folder / "own.toml"
-    file.write_text(MODULE + BRITTLE)
     said = said.format(file=file, line=file.read_text().partition("eval")[0].count("\n") + 1)
     asked = f'[[tasks]]\nkind = "brittle"\nfault = "{fault}"\n'
     scenario.write_text(scenario.read_text() + asked + "since = 0.1")
@@ -218,7 +211,6 @@ def test_a_task_that_fails_is_named_and_what_was_run_is_kept(fault, said, comman
 
 def with_plant(folder, keys):
     """Give the scenario another plant."""
-    (folder / "doors_of_mine.py").write_text(MODULE + ODD)
     scenario = folder / "own.toml"
     scenario.write_text(scenario.read_text().replace('"weak", share = 0.5', keys))
 
@@ -256,8 +248,6 @@ def test_a_plant_that_fails_is_named_and_what_was_run_is_kept(fault, said, comma
 
 def test_arrays_that_a_plugin_keeps_and_overwrites_are_its_own(command, folder):
     with_plant(folder, '"odd", then = "command[:] = 99.0"')
-    with (folder / "doors_of_mine.py").open("a") as module:
-        module.write(KEPT)
     command("run own.toml --plugin doors_of_mine --resolver kept --out a")
     command("run own.toml --plugin doors_of_mine --resolver hcod --set plant.then=pass --out b")
     np.testing.assert_array_equal(load_run("a")["command"], load_run("b")["command"])
@@ -276,9 +266,7 @@ def test_arrays_that_a_plugin_keeps_and_overwrites_are_its_own(command, folder):
     ("yield Metric('own', 'O', np.nan, '')", "'own': value = nan: expected a finite number"),
     ("yield Metric('own', 'O', 77.0, None)", "'own': unit: expected a str")])
 def test_metrics_that_fail_are_left_out_and_the_run_is_kept(body, said, command, folder):
-    with_plant(folder, '"odd"')
-    with (folder / "doors_of_mine.py").open("a") as module:
-        module.write(f"\n@register('metrics', 'own')\ndef own(recording, by):\n    {body}\n")
+    add(f"@register('metrics', 'own')\ndef own(recording, by):\n    {body}", folder)
     with pytest.warns(UserWarning, match=re.escape(said)):
         command("run own.toml --plugin doors_of_mine --out a")
     assert '"value": 77.0' not in (folder / "a" / "metrics.json").read_text()
@@ -348,8 +336,8 @@ def test_a_name_of_an_entry_point_is_found_without_being_imported_first(group, l
 
 
 @pytest.mark.parametrize(("line", "change", "said"), [
-    ("register('plants', 'odd')(3)", "plant.kind=odd", "plant of kind 'odd': TypeError: 3 is not a "
-     "callable object"),
+    ("register('plants', 'three')(3)", "plant.kind=three", "plant of kind 'three': TypeError: 3 is "
+     "not a callable object"),
     ("register('robots', 'odd')(lambda: 1 / 0)", "robot.model=odd", "robot 'odd' of a plugin: "
      "ZeroDivisionError: division by zero"),
     *((f"register('resolvers', 'odd')({made})", "control.resolver=odd", "resolver 'odd' of a "
@@ -365,15 +353,12 @@ def test_a_name_of_an_entry_point_is_found_without_being_imported_first(group, l
     ("register('tasks', 'odd')(type('Odd', (JointCoupling,), {'dimension': 1.5}))",
      "tasks.0={kind='odd', joints={joint_1=1.0}, value=0.1}", "task 'odd': dimension = 1.5: "
      "expected a whole number"),
-    ("from scenarios.recording.signals import Signal; register('signals', 'file')(Signal('odd', "
-     "'Pa', '(T,)', '')); register('plants', 'odd')(type('Odd', (KinematicArm,), {'__init__': "
-     "lambda self, robot, q, v, period, level: KinematicArm.__init__(self, robot, q, v, period, "
-     "level) or setattr(self, 'extra', {'file': q[0]})}))", "plant={kind='odd'}", "signals: 'file' "
-     "is registered with a Signal called 'odd'"),
+    ("register('signals', 'file')(Signal('odd', 'Pa', '(T,)', ''))", "plant={kind='odd', made='"
+     "self.extra = {\"file\": q[0]}'}", "signals: 'file' is registered with a Signal called 'odd'"),
     ("register('sensors', 'odd')(lambda exact: exact.measurement)", "sensor.kind=odd",
      "sensor of kind 'odd': Measurement <")])
 def test_what_is_registered_and_no_such_thing_is_named(line, change, said, folder):
-    (folder / "doors_of_mine.py").write_text(f"{MODULE}{line}\n")
+    add(line, folder)
     plugins.allow("doors_of_mine")
     avoiding = ["avoidance={kind = 'separation', obstacles = [{centre = [0.6, 0.6, 0.6]}]}"]
     refused(said, lambda: simulate(load("own.toml", [change, *avoiding * ("sensor" in change)])))
@@ -388,24 +373,20 @@ def test_what_is_registered_and_no_such_thing_is_named(line, change, said, folde
     ("register('task', 'odd')", "unknown group 'task'; did you mean 'tasks'"),
     ("register('tasks', 'odd')(None)", "tasks: 'odd' is None"),
     ("register('tasks', Weak)", "tasks: name: expected a str, got type"),
-    ("from scenarios.recording.signals import Signal; Signal('odd', 'Pa', (3,), '')",
-     "signal 'odd': shape: expected a str, got tuple (3,)"),
-    ("from scenarios.recording.signals import Signal; Signal('odd', 'Pa', '(T,)', '', '/tf')",
-     "signal 'odd': topic = '/tf': expected / and a word, none of /tf, "),  # broke its messages
-    ("from scenarios.recording.signals import Signal; Signal('file', 'Pa', '(T,)', '')",
-     "signal 'file': a name has letters, digits and \"_\"")])  # lost the run
+    ("Signal('odd', 'Pa', (3,), '')", "signal 'odd': shape: expected a str, got tuple (3,)"),
+    ("Signal('odd', 'Pa', '(T,)', '', '/tf')",  # broke its messages
+     "signal 'odd': topic = '/tf': expected / and a word, none of /tf, "),
+    ("Signal('file', 'Pa', '(T,)', '')", "signal 'file': a name has letters, digits and \"_\"")])
 def test_what_cannot_be_registered_is_refused_on_import(line, said, folder):
-    (folder / "doors_of_mine.py").write_text(f"{MODULE}{line}\n")
+    add(line, folder)
     refused(f"plugin 'doors_of_mine' cannot be imported: {said}", plugins.allow, "doors_of_mine")
     assert type(make("hcod")).__name__ == "Hcod"
     refused("'./mine.py': give the name of a module", plugins.allow, "./mine.py")
 
 
 def test_a_figure_that_fails_is_left_out_of_the_page(command, folder, undrawn):
-    figures = ("from scenarios.draw.figures.panels import Panel\nregister('figures', 'odd')(Panel("
-               "'odd', 'Odd', 'rad', 'q', lambda ax, run, colour: exit(3)))\n")
-    robot = "register('robots', 'same')(Robot.named('kuka_lwr'))\n"
-    (folder / "doors_of_mine.py").write_text(f"{MODULE}{figures}{robot}")
+    add("register('figures', 'odd')(Panel('odd', 'Odd', 'rad', 'q', lambda *_: exit(3)))\n"
+        "register('robots', 'same')(Robot.named('kuka_lwr'))", folder)
     with pytest.warns(UserWarning, match="figure 'odd' is left out: SystemExit: 3"):
         command("compare own.toml --plugin doors_of_mine --resolvers hcod,tpm --out a --workers 1 "
                 "--set robot.model=same")
