@@ -1,6 +1,5 @@
 """Scenario files, their keys and variants; groups of scenarios and where their runs part."""
 
-import json
 import sys
 from dataclasses import replace
 from pathlib import Path
@@ -14,7 +13,7 @@ import scenarios.config.reading as groups_of
 from hierarchy import HierarchyError
 from scenarios import compare
 from scenarios.cell.build import build
-from scenarios.config import Scenario, ScenarioError, load, members, shipped
+from scenarios.config import Scenario, ScenarioError, load, shipped
 from scenarios.config.distributions import flat
 from scenarios.config.reference import keys_of, sections
 from scenarios.config.resolvers import default_resolvers
@@ -153,20 +152,6 @@ def test_every_key_has_a_meaning_and_the_page_of_keys_is_as_the_program_has_them
         "run `python docs/_ext/scenario_keys.py`")
 
 
-def test_compare_runs_a_group_side_by_side_each_scenario_with_its_own_resolver(
-        tmp_path, monkeypatch, command, undrawn):
-    monkeypatch.chdir(tmp_path)
-    said = command("compare ladder --duration 0.02 --workers 1").out
-    assert "Step 2: joint limits above all tasks (tpm)" in said
-    folder = tmp_path / "runs" / "compare-ladder"
-    found = json.loads((folder / "comparison.json").read_text())
-    assert [run["scenario"] for run in found["runs"]] == members(["ladder"])
-    assert [run["label"] for run in found["runs"]] == members(["ladder"])
-    assert list(found["verdicts"]) == ["own"]
-    assert "Step 6: one-sided distances in place of repulsion (hcod)" in (
-        folder / "index.html").read_text()
-
-
 @pytest.mark.parametrize(("text", "says"), [
     ("scenarios = ['ellipse']", r"group 'mine': title"),
     ("title = 'x'\nscenarios = []", r"group 'mine': scenarios"),
@@ -177,20 +162,6 @@ def test_a_bad_group_is_an_error_that_names_it(text, says, tmp_path, monkeypatch
     (tmp_path / "mine.toml").write_text(text)
     with pytest.raises(HierarchyError, match=says):
         compare("mine")
-
-
-def test_a_resolver_that_cannot_resolve_a_scenario_is_not_run_and_is_named(tmp_path, undrawn):
-    limited = load("ellipse", {"name": "limited", "control.duration": 0.01,
-                               "control.options": {}, "limits.acceleration": 20.0})
-    free = load("ellipse", ["control.duration=0.01"])
-    done = compare([free, limited], ["recursive", "hcod"], out=tmp_path / "a")
-    assert [(run.scenario.name, run.spec) for run in done.runs] == [
-        ("ellipse", "recursive"), ("ellipse", "hcod"), ("limited", "hcod")]
-    assert done.refused == ("recursive is not run on limited, which asks for bounds: it resolves "
-                            "equalities",)
-    assert done.refused[0] in (tmp_path / "a" / "index.html").read_text()
-    refused("recursive is not run on limited", compare, [limited], ["recursive"])
-    assert limited.with_changes({"limits.place": "guard"}).asks == "equalities"
 
 
 def test_a_joint_whose_name_has_a_dot_is_changed_and_varied_by_its_name():

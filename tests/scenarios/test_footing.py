@@ -41,22 +41,16 @@ def of_a_motor_without_limit(robot):
 
 LEFT = {"frame": "left_foot", "x": [-0.05, 0.16], "y": [-0.04, 0.04]}
 CASES = {
-    "one foot beside": ({"contacts": [LEFT]}, None, "mm outside the polygon of the contacts"),
-    "on two points": ({"contacts": [{"frame": f"{side}_foot"} for side in ("left", "right")]}, None,
-                      "the contacts span no area"),
-    "no effort limit": ({}, of_a_motor_without_limit, "does not limit left_knee"),
-    "no posture": ({"tasks": [{"kind": "com"}, {"kind": "least-force"}]}, None,
-                   "no task holds left_hip_yaw"),
-    "effort limits that say nothing": ({}, of_strong_drives, "it holds the robot, whatever"),
-    "an inertia that no body has": ({}, of_a_thin_shank, "no body has the inertia that moves with "
+    "no effort limit": (of_a_motor_without_limit, "does not limit left_knee"),
+    "effort limits that say nothing": (of_strong_drives, "it holds the robot, whatever"),
+    "an inertia that no body has": (of_a_thin_shank, "no body has the inertia that moves with "
                                     "left_knee")}
 
 
 @pytest.mark.parametrize("case", CASES)
-def test_what_may_make_a_run_fall_or_prove_nothing_is_said(case):
-    changes, change, words = CASES[case]
-    scenario = load("stand-push").with_changes(changes)
-    assert words in " ".join(said(scenario, change or (lambda robot: None)))
+def test_what_a_robot_lacks_that_may_make_a_run_fall_or_prove_nothing_is_said(case):
+    change, words = CASES[case]
+    assert words in " ".join(said(load("stand-push"), change))
 
 
 def test_without_gravity_nothing_has_to_stand():
@@ -85,11 +79,6 @@ def test_feet_that_hold_each_other_in_a_symmetric_pose_are_said(tmp_path):
         assert words in " ".join(said(load("stand-push").with_changes(changed)))
     keys["start"]["joints"] |= {"l_yaw": 0.2, "r_yaw": -0.2}
     assert words not in " ".join(said(load("stand-push").with_changes(keys)))
-
-
-@pytest.mark.parametrize("name", ["stand-push", "crawl", "wipe", "reach-torque", "stand-momentum"])
-def test_shipped_scenarios_have_no_doubts(name):
-    assert not said(load(name))
 
 
 def test_a_robot_that_is_put_on_the_floor_is_carried_from_the_first_tick_on():

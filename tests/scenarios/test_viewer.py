@@ -315,12 +315,3 @@ def test_the_page_shows_the_arm_in_space_and_plays_it_until_it_is_paused(documen
         assert not page.run("player.playing")
         assert page.screenshot() != before
         assert (page.run("player.t"), page.complaints) == (stopped, [])
-
-
-def test_the_command_takes_several_runs_and_a_name(runs, tmp_path, command):
-    folders = [save(run, tmp_path / label) for label, run in runs.items()]
-    file = tmp_path / "new" / "two.html"
-    command("replay", *folders, "--out", file)
-    kept = folders[0] / "scenario.toml"
-    assert "no .html file" in command("replay", *folders, "--out", kept, code=2).err
-    assert len(data_of(file.read_text(encoding="utf-8"))["runs"]) == 2

@@ -20,22 +20,6 @@ from solvers import Resolution, Resolver, Status, certify, explain, make, solve_
 WAYPOINTS = ["position.path.times=[0, 1]", "position.path.points=[[0, 0, 0], [0, 0.1, 0]]"]
 
 
-@pytest.mark.parametrize(("name", "changes"), [
-    ("ellipse", ["start.end_effector=[5, 5, 5]"]), ("ellipse", ["robot.model=ur5"]),
-    ("stand-push", ["contacts.0.frame=left_fot"]),
-    ("ellipse-published", ["robot.control_points=[" + 8 * "{joint='joint_4'}," + "]"]),
-    ("stand-push-smooth", ['control.options.merged.scales={"least forc"=9.0}']),
-    ("human", ["plant.kind=kinematic", "control.metric=mass", "sensor.latency=0.01"])])
-def test_what_does_not_fit_the_robot_is_said_by_check_and_run(
-        name, changes, command, tmp_path, monkeypatch):
-    monkeypatch.setattr("scenarios.cell.robot._REACH_STEPS", 20)
-    sets = [part for change in changes for part in ("--set", change)]
-    checked = command("check", name, *sets, code=2).err
-    run = command("run --duration 0.01", name, "--out", tmp_path / "run", *sets, code=2)
-    assert run.err.splitlines()[-1] == checked.splitlines()[-1]
-    assert not list(tmp_path.rglob("*.npz"))
-
-
 def test_sections_of_another_kind_are_replaced_by_a_file_that_extends_and_by_keys(tmp_path):
     path = tmp_path / "mine.toml"
     path.write_text('extends = "human"\nname = "mine"\n[sensor]\nkind = "exact"\n'
