@@ -188,6 +188,8 @@ def test_runs_that_are_one_motion_are_as_far_apart_as_the_farthest_of_them():
     (one,) = motions([run_of("recursive"), run_of("hqp", away_from(1, 5e-6)),
                       run_of("hcod", away_from(1, 2e-6))])
     assert (one.labels, one.apart) == (("recursive", "hqp", "hcod"), 5e-6)
+    (one,) = partings([run_of("recursive"), run_of("hqp", away_from(1, 5e-7))])
+    assert str(one) == "hqp stays within 5.0e-07 rad of recursive to the end"
 
 
 NOT_SOLVED = 3 * np.eye(5, dtype=int)  # at tick 0, 1, ...
