@@ -12,8 +12,7 @@ from refusals import refused
 import scenarios.config.reading as groups_of
 from hierarchy import HierarchyError
 from scenarios import compare
-from scenarios.cell.build import build
-from scenarios.config import Scenario, ScenarioError, load, shipped
+from scenarios.config import Scenario, load, shipped
 from scenarios.config.distributions import flat
 from scenarios.config.reference import keys_of, sections
 from scenarios.config.resolvers import default_resolvers
@@ -112,15 +111,6 @@ def test_tables_are_read_at_a_path_and_flattened_and_what_is_none_is_empty_or_st
     data = {"a": 3, "b": [{"c": 1}]}
     assert [_table(data, path) for path in (["b", 0], ["a"], ["a", "d"], ["b", 1], [])] == [
         {"c": 1}, {}, {}, {}, data]
-
-
-def test_a_stack_that_asks_for_nothing_is_refused(tmp_path):
-    path = tmp_path / "idle.toml"
-    path.write_text('name = "idle"\n[robot]\nmodel = "kuka_lwr"\n'
-                    '[control]\nresolver = "tpm"\nduration = 1.0\n')
-    refused("scenario 'idle': the stack is empty", lambda: build(load(path)), error=ScenarioError)
-    posture = load(path, ["control.stack=hierarchical", "posture.role=task"])
-    assert build(posture).stack.names == ("posture",)
 
 
 def test_waypoints_of_obstacles_vary_within_their_spread_and_half_the_time_beside_them():

@@ -11,7 +11,7 @@ from hierarchy import Hierarchy
 from scenarios import load, simulate
 from scenarios.measure.causes import Tick, causes
 from scenarios.measure.goals import Goal, goals, percent
-from scenarios.measure.happenings import happened, jumps
+from scenarios.measure.happenings import happened
 from scenarios.measure.metrics import measure
 from scenarios.measure.runs import Run
 from scenarios.measure.statistics import EXACT, best, paired, wilson
@@ -229,15 +229,6 @@ def test_an_answer_that_the_resolver_does_not_give_is_not_blamed_on_the_rows():
     before = tick(WIDE, ((1.0, 0.0), 0.5))
     (text,) = said(before, before._replace(x=np.array([-0.9, 0.0])))
     assert text.startswith("other: one of two answers to the same data was not sent as it is")
-
-
-def test_what_a_resolver_carries_from_tick_to_tick_is_no_cause():
-    run = simulate(load("reach-torque-smooth").with_changes({"control.duration": 0.05}))
-    assert [cause.kind for cause in jumps(run, 30)[0].causes] == ["side"]
-    assert [jump.tick for jump in jumps(run, 1)] == [1]  # the first that has one before it
-    calm = {"control.duration": 0.26, "control.damping": 1.0}
-    run = simulate(load("strictness", calm).with_resolver("merged"))
-    assert [cause.kind for cause in jumps(run, 250)[0].causes] == ["data"]
 
 
 @pytest.mark.parametrize(("step", "shown"), [(50.0 * (1.0 + 1e-14), 0), (50.1, 1)])

@@ -134,16 +134,6 @@ def test_collision_says_where_in_the_list_the_obstacles_come(tmp_path):
     assert later.tasks.give == {"separation": 0.01}
 
 
-def test_a_recorded_path_is_followed(tmp_path):
-    (tmp_path / "motion.csv").write_text("t,x,y,z\n0,0,0.6,0.1\n0.7,0.1,0.6,0.15\n"
-                                         "1.2,0.1,0.6,0.2\n")
-    path = {"kind": "recorded", "file": "motion.csv"}
-    run = simulate(scenario_of(tmp_path, position={"path": path, "gain": 20.0}))
-    assert run.fault is None
-    # What is left is what integrating velocities over a period leaves: v T / 2 and less.
-    assert np.linalg.norm(run["position_error"][-30:], axis=1).max() < 2e-3
-
-
 # -- set-based tasks and smooth activation in place of Algorithm 1 --------------------------------
 def distances(cell):
     """The distance of every point to every obstacle, point by point, by plain arithmetic."""

@@ -7,7 +7,7 @@ import pinocchio as pin
 import pytest
 from mechanisms import four_bar
 from standing import IDEAL, accelerations
-from urdf_text import LIMIT, joint, link, urdf
+from urdf_text import joint, link, urdf
 
 from hierarchy import Robot, State, plugins
 from hierarchy.contacts import Contacts
@@ -174,17 +174,6 @@ def test_a_start_is_closed_where_it_names_no_joint_and_refused_where_it_cannot_b
         build(scenario(start={"joints": {"crank": 0.0, "rocker": 2.0}}))
     with pytest.raises(ScenarioError, match=r"start: joint 'crank': its \(cos, sin\)"):
         build(scenario(start={"q": [2.0, 0.0, 0.0, 0.0, 0.0, 0.0]}))
-
-
-def test_couplings_that_contradict_each_other_are_said_where_a_robot_is_checked(tmp_path, command):
-    """Only a run said so: its start was refused."""
-    follow = LIMIT + '<mimic joint="{}" offset="0.2"/>'
-    path = tmp_path / "circle.urdf"
-    path.write_text(urdf(*map(link, "abc"),
-                         joint("one", "revolute", "a", "b", follow.format("two")),
-                         joint("two", "revolute", "b", "c", follow.format("one"))))
-    assert ("posture near rest that closes the mechanism: couplings one = 1 two + 0.2 in the file: "
-            "it stays open by 0.2") in command("check", path).out
 
 
 def test_joints_of_a_mechanism_that_a_posture_names_reach_their_values():

@@ -60,13 +60,6 @@ def test_a_run_that_ends_in_its_first_tick_is_saved_and_has_nothing_to_export(
     refused("the recording has no tick", export, run, tmp_path / "run.mcap")
 
 
-def test_answers_that_settle_are_certified_under_faults_too():
-    keys = {"control.duration": 5.0, "control.damping": 1.0, "control.period": 0.01,
-            "faults": [{"kind": "overrun", "at": 0.5, "duration": 0.1, "takes": 0.001}]}
-    scenario = load("singular", keys).with_resolver("hcod:damping=0.0")
-    assert simulate(scenario, certified=True)["certified"].all()
-
-
 def test_a_level_that_gives_is_certified_unless_its_solve_failed():
     listed = [{"kind": "position", "frame": "end_effector", "give": 0.1}, {"kind": "posture"}]
     failures = [{"kind": "status", "at": 0.002, "duration": 0.001, "status": "inaccurate"}]

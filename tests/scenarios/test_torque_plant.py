@@ -20,6 +20,8 @@ from scenarios.cell.build import build
 from scenarios.cell.plants.torque import TorqueRobot, inside
 from scenarios.config import ScenarioError
 from scenarios.config.sections.plant import PushSection, TorqueSection
+from scenarios.loop.controller import Controller
+from scenarios.loop.footing import footing
 from scenarios.measure.metrics import measure
 from scenarios.measure.safety import standing
 
@@ -219,15 +221,6 @@ def test_a_run_whose_simulation_breaks_is_measured_up_to_there(name, keys):
     assert measure(run)["stack_changes"].value == 0.0
 
 
-def test_the_effort_of_a_joint_that_slides_is_a_force(tmp_path):
-    one_joint(tmp_path, kind="prismatic")
-    robot = {"model": str(tmp_path / "one.urdf")}
-    run = simulate(load("wipe", {"robot": robot, "start": {}, "contacts": [], "plant.pushes": [],
-                                 "tasks": [{"kind": "posture"}], "control.duration": 0.002}))
-    assert run.units()["command"] == ("N",)
-    assert measure(run)["torque_step_max"].unit == "N"
-
-
 def test_a_base_that_tilts_has_fallen():
     q, v = ROBOT.rest.copy(), np.zeros(ROBOT.n)
     q[2] += 100.0
@@ -261,3 +254,54 @@ def test_the_margin_of_support_is_that_from_the_nearest_edge(place, found):
     corners = np.array([(0.0, 0.0), (1.0, 1.0), (1.0, 0.0), (0.0, 1.0), (0.5, 0.2), (0.0, 0.0)])
     assert inside(corners, np.array(place)) == pytest.approx(found)
     assert np.isnan(inside(corners[:2], np.array(place)))
+
+
+def doubts(scenario, change):
+    """What a first tick says of a robot with contacts whose run may fall, or prove nothing."""
+    cell = build(scenario)
+    change(cell.robot)
+    controller = Controller(scenario, cell)
+    controller.command(0.0, cell.plant.q, cell.plant.v)
+    return list(footing(controller))
+
+
+def of_strong_drives(robot):
+    robot.effort_limit[robot.actuated:] *= 1000.0
+
+
+def of_a_thin_shank(robot):
+    knee = robot.joint("left_knee")
+    robot.model.inertias[knee] = pin.Inertia(3.0, np.zeros(3), np.diag([0.03, 0.01, 0.01]))
+
+
+def of_a_motor_without_limit(robot):
+    robot.effort_limit[robot.velocity_names.index("left_knee")] = np.inf
+
+
+LEFT = {"frame": "left_foot", "x": [-0.05, 0.16], "y": [-0.04, 0.04]}
+CASES = {
+    "no effort limit": (of_a_motor_without_limit, "does not limit left_knee"),
+    "effort limits that say nothing": (of_strong_drives, "it holds the robot, whatever"),
+    "an inertia that no body has": (of_a_thin_shank, "no body has the inertia that moves with "
+                                    "left_knee")}
+
+
+@pytest.mark.parametrize("case", CASES)
+def test_what_a_robot_lacks_that_may_make_a_run_fall_or_prove_nothing_is_said(case):
+    change, words = CASES[case]
+    assert words in " ".join(doubts(load("stand-push"), change))
+
+
+def test_without_gravity_nothing_has_to_stand():
+    scenario = load("stand-push").with_changes({"contacts": [LEFT]})
+    assert "stand" not in " ".join(doubts(
+        scenario, lambda robot: setattr(robot.model.gravity, "linear", np.zeros(3))))
+
+
+def test_a_robot_that_is_put_on_the_floor_is_carried_from_the_first_tick_on():
+    """Rounding decided: the quadruped's knees were at 2.2 rad/s before a contact carried."""
+    cell = build(load("crawl"))
+    controller = Controller(cell.scenario, cell)
+    cell.plant.act(controller.command(0.0, cell.plant.q, cell.plant.v))
+    assert cell.plant.extra["floor_force"][:, 2].min() > 1.0
+    assert np.abs(cell.plant.v[6:]).max() < 0.2
