@@ -26,15 +26,6 @@ def in_an_empty_folder(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
 
 
-def test_an_output_folder_in_use_stops_the_run_before_it_begins(tmp_path, command, monkeypatch):
-    stands_in(mock.Mock(side_effect=AssertionError("the run began")), monkeypatch)
-    (tmp_path / "precious").mkdir()
-    (tmp_path / "precious" / "thesis.tex").touch()
-    for what in ("run", "compare"):
-        assert "not empty" in command(what, "ellipse", "--out", "precious", code=2).err
-    assert [path.name for path in (tmp_path / "precious").iterdir()] == ["thesis.tex"]
-
-
 def stands_in(instead, monkeypatch, name="simulate"):
     """Take the place of a function where runs are made, and where they are compared."""
     for module in ("scenarios.loop.simulation", "scenarios.results.comparing"):

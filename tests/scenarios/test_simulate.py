@@ -15,7 +15,6 @@ from scenarios.export import export
 from scenarios.loop.recorder import Recorder
 from scenarios.measure.judging import Rows
 from scenarios.recording.fate import Fate
-from solvers import Status
 
 SHORT = ["control.duration=3.0"]
 
@@ -58,21 +57,6 @@ def test_a_run_that_ends_in_its_first_tick_is_saved_and_has_nothing_to_export(
     assert load_run(save(run, tmp_path / "run")).ticks == 0
     pytest.importorskip("mcap")
     refused("the recording has no tick", export, run, tmp_path / "run.mcap")
-
-
-def test_a_level_that_gives_is_certified_unless_its_solve_failed():
-    listed = [{"kind": "position", "frame": "end_effector", "give": 0.1}, {"kind": "posture"}]
-    failures = [{"kind": "status", "at": 0.002, "duration": 0.001, "status": "inaccurate"}]
-    keys = {"position": None, "pointing": None, "avoidance": None, "tasks": listed,
-            "control.stack": "hierarchical", "control.duration": 0.004, "faults": failures,
-            "control.policy.inaccurate": "use"}
-    scenario = load("ellipse-hqp", keys).with_resolver("hcod")
-    run = simulate(scenario, certified=True)
-    assert run["status"].tolist() == [0, 0, Status.INACCURATE, 0]
-    assert run["certified"].all()
-    run = simulate(scenario.with_resolver("hcod:max_iterations=1"), certified=True)
-    assert run.fault is None
-    assert not run["certified"][0]
 
 
 def test_a_stack_without_tasks_has_a_set_of_no_rows():
