@@ -44,9 +44,10 @@ def test_rounding_of_a_robot_at_rest_at_its_targets_is_not_said_to_be_missed():
 def test_obstacles_are_reached_by_number_or_all_at_once():
     found = load("ellipse", ["avoidance.obstacles.1.centre=[0, 0, 1]"]).avoidance.obstacles
     assert found[1].centre == (0.0, 0.0, 1.0)
-    balls = load("ellipse", ["avoidance.obstacles.*={shape='sphere', radius=0.1, "
-                             "centre=[1, 1, 1]}"]).avoidance.obstacles
-    assert [ball.radius for ball in balls] == [0.1] * 3
+    ball = {"shape": "sphere", "radius": 0.1, "centre": [1, 1, 1]}
+    balls = load("ellipse", {"avoidance.obstacles.*": ball, "avoidance.obstacles.1.radius": 0.2})
+    assert [one.radius for one in balls.avoidance.obstacles] == [0.1, 0.2, 0.1]
+    assert ball["radius"] == 0.1  # was changed with all that stood for it
 
 
 @pytest.mark.parametrize(("text", "said"), [
