@@ -5,6 +5,7 @@ every entry: `avoidance.obstacles.*.radius`. `--set`, sweeps and `[variation]` h
 """
 
 from collections.abc import Iterator, Mapping, Sequence
+from copy import deepcopy
 from typing import Any
 
 from hierarchy.errors import UnknownNameError, brief, expect
@@ -65,7 +66,7 @@ def change_all(data: dict[str, Any], changes: Mapping[str, Any], root: type[Sect
                 below = table.get(last) if isinstance(table, dict) else None
                 if isinstance(below, dict) and _leaves(below, changes[key], root, key):
                     _vary_no_more(data, one)
-                table[last] = changes[key]
+                table[last] = deepcopy(changes[key])
 
 
 def matching(data: Any, pattern: str) -> Iterator[str]:

@@ -136,19 +136,6 @@ def test_jitter_delays_each_frame_by_less_than_its_most_and_by_the_seed():
     assert same.time(5) == times[5] != other.time(5)
 
 
-@pytest.mark.parametrize(("make", "said"), [
-    (lambda: load("human", ["sensor.width=0"]), "sensor.width: Input should be greater"),
-    (lambda: load("human", ["sensor.fx=nan"]), "sensor.fx: Input should be a finite"),
-    (lambda: load("human", ["sensor.position=[0, inf, 0]"]), "sensor.position.1: Input"),
-    (lambda: Pinhole(rotation=np.eye(3) * 1.1), "rotation"),
-    (lambda: Pinhole(rotation=np.diag([1, 1, -1])), "rotation"),
-    (lambda: looking_at((1, 2, 3), (1, 2, 3)), "position and look_at are both"),
-    (lambda: looking_at([0.0, 0.0, 1.0], [0.0, 0.0, 1.0]), "position and look_at are both"),
-    (lambda: camera(rate=30.0, jitter=0.05), "jitter = 0.05 s")])
-def test_what_cannot_be_is_refused_by_name(make, said):
-    refused(said, make)
-
-
 def test_a_camera_faces_what_it_looks_at_with_the_middle_of_its_pixels():
     assert (Pinhole(**SMALL).cx, Pinhole(**SMALL).cy) == (39.5, 29.5)  # of 0 to 79, of 0 to 59
     R = looking_at([0.0, 0.0, 1.0], [0.0, 1.0, 1.0])

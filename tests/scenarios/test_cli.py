@@ -1,6 +1,5 @@
 """Commands: what they write, and how they end where something is not as usual."""
 
-import importlib
 import json
 import os
 import signal
@@ -27,23 +26,14 @@ def in_an_empty_folder(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
 
 
-def test_an_output_folder_in_use_stops_the_run_before_it_begins(tmp_path, command, monkeypatch):
-    simulation_is(mock.Mock(side_effect=AssertionError("the run began")), monkeypatch)
-    (tmp_path / "precious").mkdir()
-    (tmp_path / "precious" / "thesis.tex").touch()
-    for what in ("run", "compare"):
-        assert "not empty" in command(what, "ellipse", "--out", "precious", code=2).err
-    assert [path.name for path in (tmp_path / "precious").iterdir()] == ["thesis.tex"]
-
-
-def simulation_is(stand_in, monkeypatch):
+def stands_in(instead, monkeypatch, name="simulate"):
+    """Take the place of a function where runs are made, and where they are compared."""
     for module in ("scenarios.loop.simulation", "scenarios.results.comparing"):
-        monkeypatch.setattr(importlib.import_module(module), "simulate", stand_in)
+        monkeypatch.setattr(f"{module}.{name}", instead, raising=name == "simulate")
 
 
 def test_a_fault_is_reported_and_the_run_kept(tmp_path, command, monkeypatch):
-    simulation_is(lambda scenario, **_: recording(scenario, fault="interrupted at tick 5"),
-                  monkeypatch)
+    stands_in(lambda scenario, **_: recording(scenario, fault="interrupted at tick 5"), monkeypatch)
     assert "fault: interrupted at tick 5" in command("run ellipse --out a", code=1).err
     assert (tmp_path / "a" / "run.npz").exists()
 
@@ -54,7 +44,7 @@ def test_one_run_that_breaks_does_not_lose_the_others(tmp_path, monkeypatch, com
             raise ArithmeticError("[bold]no[/bold] answer")
         return recording(scenario)
 
-    simulation_is(breaks_under_recursive, monkeypatch)
+    stands_in(breaks_under_recursive, monkeypatch)
     done = compare("ellipse", ["recursive", "tpm"], out=tmp_path / "b")
     assert [run.fault for run in done.runs] == ["ArithmeticError: [bold]no[/bold] answer", None]
     monkeypatch.setenv("HOME", str(tmp_path))
@@ -110,30 +100,21 @@ def test_an_interrupted_comparison_keeps_what_ended_and_names_the_folder(
     assert {"results.csv", *pages} <= {path.name for path in (tmp_path / "b").iterdir()}
 
 
-def test_a_comparison_interrupted_before_the_first_tick_leaves_no_folder(
-        tmp_path, monkeypatch, command):
-    monkeypatch.setattr(comparing, "simulate", mock.Mock(side_effect=KeyboardInterrupt))
-    said = command("compare ellipse --resolvers tpm,hcod --out b --workers 1", code=130).err
-    assert "so far" not in said
-    assert not (tmp_path / "b").exists()
-
-
-def test_an_interruption_while_runs_are_timed_ends_the_comparison(
-        monkeypatch, command, undrawn):
-    simulation_is(lambda scenario, **_: recording(scenario, fault="interrupted at tick 3"),
-                  monkeypatch)
-    said = command("compare ellipse --resolvers tpm,hcod --duration 0.02 --out b --workers 2",
-                   code=130).err
-    assert "the runs made so far are in b\n" in said
-
-
-def test_a_table_that_cannot_be_written_stops_no_run_of_a_comparison(
-        tmp_path, monkeypatch, command):
-    monkeypatch.setattr(comparing, "write_table", mock.Mock(side_effect=FullError("full")))
-    said = command("compare ellipse --resolvers tpm,hcod --duration 0.02 --out b --workers 1",
-                   code=1).err
-    assert "FullError: full; the runs are in b" in said
-    assert len(list(tmp_path.rglob("run.npz"))) == 2
+@pytest.mark.parametrize(("name", "instead", "workers", "code", "said", "kept"), [
+    ("simulate", mock.Mock(side_effect=KeyboardInterrupt), 1, 130, "interrupted", 0),
+    ("simulate", lambda run, **_: recording(run, fault="interrupted at tick 3"), 2, 130,
+     "the runs made so far are in b", 2),
+    ("write_table", mock.Mock(side_effect=FullError("full")), 1, 1,
+     "FullError: full; the runs are in b", 2)],
+    ids=["before the first tick", "while runs are timed", "no room for the table"])
+def test_a_comparison_that_ends_early_keeps_the_runs_that_ended_and_no_empty_folder(
+        name, instead, workers, code, said, kept, tmp_path, monkeypatch, command, undrawn):
+    stands_in(instead, monkeypatch, name)
+    told = command("compare ellipse --resolvers tpm,hcod --duration 0.02 --out b --workers",
+                   workers, code=code).err
+    assert f"{said}\n" in told
+    assert len(list(tmp_path.rglob("run.npz"))) == kept
+    assert (tmp_path / "b").exists() == ("runs" in told) == (kept > 0)
 
 
 def test_a_table_is_as_many_tables_as_80_columns_need(capsys):
@@ -212,23 +193,6 @@ def test_an_unknown_user_in_a_path_is_the_name_of_a_folder(tmp_path, monkeypatch
      "no such task"), ("own.toml: key", ["own.toml"], "own.toml: key")])
 def test_an_error_names_the_one_file_of_a_command_once(text, files, said):
     assert _with_its_file(text, ["run", *files]) == said
-
-
-@pytest.mark.parametrize(("words", "options", "why"), [
-    ("run ellipse --no-wait --port 8081", "--wait/--no-wait, --port", "needs --live"),
-    ("run ellipse --live --json", "--json", "cannot be combined with --live"),
-    ("compare ellipse --seed 0 --part 1/2", "--seed, --part", "needs --starts"),
-    ("sweep ellipse-starts --scheduler a:1 --workers 2", "--workers",
-     "cannot be combined with --scheduler"),
-    ("library --check --fix 7 5 3 --out c", "--fix", "cannot be combined with --check"),
-    ("problems show a.npz --count 2", "--count", "is for a family, not for a file"),
-    ("bench --out b tick", "--out", "comes after tick"),
-    ("bench peers --install --scene stand", "--scene", "cannot be combined with --install"),
-    ("bench open --install --check", "--check", "cannot be combined with --install"),
-    ("bench open --check --fresh 3", "--fresh", "cannot be combined with --check"),
-    ("reproduce --fill --quick", "--quick", "cannot be combined with --fill")])
-def test_an_option_that_would_have_no_effect_is_refused(words, options, why, command):
-    assert command(words, code=2).err.endswith(f"Invalid value for {options}: {why}\n")
 
 
 def test_names_of_settings_that_differ_late_give_different_folders():

@@ -1,6 +1,5 @@
 """Scenario files, their keys and variants; groups of scenarios and where their runs part."""
 
-import json
 import sys
 from dataclasses import replace
 from pathlib import Path
@@ -13,8 +12,7 @@ from refusals import refused
 import scenarios.config.reading as groups_of
 from hierarchy import HierarchyError
 from scenarios import compare
-from scenarios.cell.build import build
-from scenarios.config import Scenario, ScenarioError, load, members, shipped
+from scenarios.config import Scenario, load, shipped
 from scenarios.config.distributions import flat
 from scenarios.config.reference import keys_of, sections
 from scenarios.config.resolvers import default_resolvers
@@ -115,24 +113,6 @@ def test_tables_are_read_at_a_path_and_flattened_and_what_is_none_is_empty_or_st
         {"c": 1}, {}, {}, {}, data]
 
 
-def test_a_stack_that_asks_for_nothing_is_refused(tmp_path):
-    path = tmp_path / "idle.toml"
-    path.write_text('name = "idle"\n[robot]\nmodel = "kuka_lwr"\n'
-                    '[control]\nresolver = "tpm"\nduration = 1.0\n')
-    refused("scenario 'idle': the stack is empty", lambda: build(load(path)), error=ScenarioError)
-    posture = load(path, ["control.stack=hierarchical", "posture.role=task"])
-    assert build(posture).stack.names == ("posture",)
-    refused("2 tasks are named 'a_b'", load, path, [  # the errors of both would be one signal
-        "control.stack=hierarchical",
-        "tasks=[{kind='posture', name='a b'}, {kind='com', name='a_b'}]"])
-    # and here one metric, as below
-    refused("task 'a': another one has the name of its rotation, 'a turned'", load, path, [
-        "control.stack=hierarchical",
-        "tasks=[{kind='pose', name='a', frame='tool0'}, {kind='com', name='a turned'}]"])
-    refused("2 tasks are named 'joint_limits'", lambda: build(load("reach-torque", [
-        "tasks.0.name=joint_limits"])), error=ScenarioError)
-
-
 def test_waypoints_of_obstacles_vary_within_their_spread_and_half_the_time_beside_them():
     def paths(seed, spread, timing):
         change = f"avoidance.variation={{seed={seed}, spread={spread}, timing={timing}}}"
@@ -162,30 +142,6 @@ def test_every_key_has_a_meaning_and_the_page_of_keys_is_as_the_program_has_them
         "run `python docs/_ext/scenario_keys.py`")
 
 
-@pytest.mark.parametrize(("key", "said"), [
-    ("plant.kind", '[plant]\n  kind: default "kinematic"\n      "kinematic": Follows its '),
-    ("tasks.0.path.kind", '[tasks.path]\n  kind: required\n      "still": A point that'),
-    ("kind", "kind is a key of several sections:\n  plant.kind\n  sensor.kind\n  pointing.kind\n"
-             "  avoidance.kind\n"),
-    ("pointing.kind", '[pointing]\n  kind: "equality", "inequality", default "inequality"\n')])
-def test_a_kind_is_explained_by_those_there_are(key, said, command):
-    assert command("help", key).out.startswith(said)
-
-
-def test_compare_runs_a_group_side_by_side_each_scenario_with_its_own_resolver(
-        tmp_path, monkeypatch, command, undrawn):
-    monkeypatch.chdir(tmp_path)
-    said = command("compare ladder --duration 0.02 --workers 1").out
-    assert "Step 2: joint limits above all tasks (tpm)" in said
-    folder = tmp_path / "runs" / "compare-ladder"
-    found = json.loads((folder / "comparison.json").read_text())
-    assert [run["scenario"] for run in found["runs"]] == members(["ladder"])
-    assert [run["label"] for run in found["runs"]] == members(["ladder"])
-    assert list(found["verdicts"]) == ["own"]
-    assert "Step 6: one-sided distances in place of repulsion (hcod)" in (
-        folder / "index.html").read_text()
-
-
 @pytest.mark.parametrize(("text", "says"), [
     ("scenarios = ['ellipse']", r"group 'mine': title"),
     ("title = 'x'\nscenarios = []", r"group 'mine': scenarios"),
@@ -196,20 +152,6 @@ def test_a_bad_group_is_an_error_that_names_it(text, says, tmp_path, monkeypatch
     (tmp_path / "mine.toml").write_text(text)
     with pytest.raises(HierarchyError, match=says):
         compare("mine")
-
-
-def test_a_resolver_that_cannot_resolve_a_scenario_is_not_run_and_is_named(tmp_path, undrawn):
-    limited = load("ellipse", {"name": "limited", "control.duration": 0.01,
-                               "control.options": {}, "limits.acceleration": 20.0})
-    free = load("ellipse", ["control.duration=0.01"])
-    done = compare([free, limited], ["recursive", "hcod"], out=tmp_path / "a")
-    assert [(run.scenario.name, run.spec) for run in done.runs] == [
-        ("ellipse", "recursive"), ("ellipse", "hcod"), ("limited", "hcod")]
-    assert done.refused == ("recursive is not run on limited, which asks for bounds: it resolves "
-                            "equalities",)
-    assert done.refused[0] in (tmp_path / "a" / "index.html").read_text()
-    refused("recursive is not run on limited", compare, [limited], ["recursive"])
-    assert limited.with_changes({"limits.place": "guard"}).asks == "equalities"
 
 
 def test_a_joint_whose_name_has_a_dot_is_changed_and_varied_by_its_name():
@@ -236,6 +178,8 @@ def test_runs_that_are_one_motion_are_as_far_apart_as_the_farthest_of_them():
     (one,) = motions([run_of("recursive"), run_of("hqp", away_from(1, 5e-6)),
                       run_of("hcod", away_from(1, 2e-6))])
     assert (one.labels, one.apart) == (("recursive", "hqp", "hcod"), 5e-6)
+    (one,) = partings([run_of("recursive"), run_of("hqp", away_from(1, 5e-7))])
+    assert str(one) == "hqp stays within 5.0e-07 rad of recursive to the end"
 
 
 NOT_SOLVED = 3 * np.eye(5, dtype=int)  # at tick 0, 1, ...

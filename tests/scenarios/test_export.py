@@ -11,7 +11,7 @@ from scipy.spatial.transform import Rotation
 
 from hierarchy import Robot, State
 from hierarchy.avoidance import Obstacle
-from scenarios import load, save, simulate
+from scenarios import load, simulate
 from scenarios.export import _bytes, export, foxglove
 from scenarios.recording.recording import Event
 from scenarios.scene.drawn import scene
@@ -134,22 +134,10 @@ def test_the_layout_shows_only_what_the_file_has(messages):
         assert len(np.atleast_1d(found[topic][0][1][name])) > int(index or 0)
 
 
-@pytest.mark.parametrize(("name", "said"), [
-    ("mine.mcap", "exists"), ("run.csv", "to_dataframe"), ("run.parquet", "to_dataframe")])
-def test_what_cannot_be_written_says_why(run, tmp_path, name, said, monkeypatch):
-    (tmp_path / "mine.mcap").write_text("mine")
-    refused(said, export, run, tmp_path / name)
-    assert [(one.name, one.read_text()) for one in tmp_path.iterdir()] == [("mine.mcap", "mine")]
+def test_without_its_package_nothing_is_exported(run, tmp_path, monkeypatch):
+    refused("to_dataframe", export, run, tmp_path / "run.parquet")
     monkeypatch.setattr("scenarios.export.find_spec", lambda name: None)
     refused("pip install 'task-hierarchy[export]'", export, run, tmp_path / "run.mcap")
-
-
-def test_the_command_exports_a_run_beside_it_or_where_it_is_told(run, tmp_path, command):
-    pytest.importorskip("mcap")
-    folder, other = save(run, tmp_path / "run"), tmp_path / "other.mcap"
-    command("export", folder)
-    assert "other.mcap" in command("export", folder, "--out", other).out
-    assert other.read_bytes() == (folder / "run.mcap").read_bytes()
 
 
 @pytest.mark.parametrize(("shape", "size", "part", "drawn", "spheres"), [

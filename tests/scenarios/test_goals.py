@@ -11,7 +11,7 @@ from hierarchy import Hierarchy
 from scenarios import load, simulate
 from scenarios.measure.causes import Tick, causes
 from scenarios.measure.goals import Goal, goals, percent
-from scenarios.measure.happenings import given_up, happened, jumps
+from scenarios.measure.happenings import happened
 from scenarios.measure.metrics import measure
 from scenarios.measure.runs import Run
 from scenarios.measure.statistics import EXACT, best, paired, wilson
@@ -88,20 +88,6 @@ def test_a_run_lasts_as_long_as_its_whole_ticks():
     scenario = load("ellipse", {"control.period": 0.3, "control.duration": 1.0})
     (found,) = verdicts([Run(scenario, "a", "a", recording(scenario, t=[0.0, 0.3, 0.6]))])
     assert found.end == "ran the whole 0.9 s"
-
-
-def test_a_step_that_is_too_fast_is_held_back_by_the_joints_at_their_limits():
-    position, posture = given_up(simulate(load("strictness", ["control.duration=0.3"])))
-    assert (position.level, posture.level) == ("position", "posture")
-    assert 0.5 < position.share <= 1.0
-    assert position.seconds == pytest.approx(position.share * 0.3)
-    held = dict(position.held_by)
-    assert max(held.values()) == 1.0
-    assert all(name.startswith("joint limits joint_") and name.endswith(" side") for name in held)
-    assert "position" in dict(posture.held_by)
-    assert str(position).startswith(f"row missed: position in {100 * position.share:.0f} % of its "
-                                    f"ticks ({position.seconds:.3g} s); held back by joint limits ")
-    assert given_up(simulate(load("ellipse-hqp", ["control.duration=0.05"]))) == ()
 
 
 @pytest.mark.parametrize("seed", range(5))
@@ -243,15 +229,6 @@ def test_an_answer_that_the_resolver_does_not_give_is_not_blamed_on_the_rows():
     before = tick(WIDE, ((1.0, 0.0), 0.5))
     (text,) = said(before, before._replace(x=np.array([-0.9, 0.0])))
     assert text.startswith("other: one of two answers to the same data was not sent as it is")
-
-
-def test_what_a_resolver_carries_from_tick_to_tick_is_no_cause():
-    run = simulate(load("reach-torque-smooth").with_changes({"control.duration": 0.05}))
-    assert [cause.kind for cause in jumps(run, 30)[0].causes] == ["side"]
-    assert [jump.tick for jump in jumps(run, 1)] == [1]  # the first that has one before it
-    calm = {"control.duration": 0.26, "control.damping": 1.0}
-    run = simulate(load("strictness", calm).with_resolver("merged"))
-    assert [cause.kind for cause in jumps(run, 250)[0].causes] == ["data"]
 
 
 @pytest.mark.parametrize(("step", "shown"), [(50.0 * (1.0 + 1e-14), 0), (50.1, 1)])

@@ -33,14 +33,6 @@ def test_limits_and_distances_are_kept_and_no_tick_fails(level, resolver):
     assert not certified or run["certified"].all()
 
 
-def test_the_strictness_scenario_measures_what_a_lower_task_moves():
-    scenario = load("strictness", ["control.duration=0.3"])
-    strict, weighted = (measure(simulate(one))["moved_by_lower_max"].value for one in (
-        scenario, scenario.with_resolver("weighted:ratio=10")))
-    assert strict < 1e-9
-    assert weighted > 1e-7
-
-
 BEYOND = [1.1657, -0.9476, 0.5844, float(ROBOT.upper[3]) + 0.1, 1.1464, 1.7695, 0.0]
 STARTS = {"stretched": "start.q=[0, 0, 0, 0, 0, 0, 0]",
           "beyond a limit": f"start={{q={BEYOND}, allow_outside_limits=true}}",
@@ -140,18 +132,6 @@ def test_collision_says_where_in_the_list_the_obstacles_come(tmp_path):
     assert later.stack.names == ("position", "separation", "coupling")
     assert isinstance(later.stack["separation"], Separation)
     assert later.tasks.give == {"separation": 0.01}
-    refused("tasks.0: name = 'hands'", scenario_of, tmp_path, {**listed, "name": "hands"},
-            avoidance=avoidance)
-
-
-def test_a_recorded_path_is_followed(tmp_path):
-    (tmp_path / "motion.csv").write_text("t,x,y,z\n0,0,0.6,0.1\n0.7,0.1,0.6,0.15\n"
-                                         "1.2,0.1,0.6,0.2\n")
-    path = {"kind": "recorded", "file": "motion.csv"}
-    run = simulate(scenario_of(tmp_path, position={"path": path, "gain": 20.0}))
-    assert run.fault is None
-    # What is left is what integrating velocities over a period leaves: v T / 2 and less.
-    assert np.linalg.norm(run["position_error"][-30:], axis=1).max() < 2e-3
 
 
 # -- set-based tasks and smooth activation in place of Algorithm 1 --------------------------------
@@ -194,10 +174,6 @@ def test_the_tangent_cone_of_the_letters_cone_has_its_jacobian_and_refuses_accel
     with pytest.raises(HierarchyError, match="velocity level, got level = 'acceleration'"):
         cone.writer(state, "acceleration", Rows.empty(1, ROBOT.n))
     refused("kind = 'equality'", lambda: TangentCone(Pointing(FRAME, (1.0, 0.0, 0.0), 0.3)))
-
-
-def test_a_frozen_task_has_no_rate_that_could_be_too_fast_for_the_period():
-    assert build(load("ellipse-set-based", {"control.period": 0.11})).tasks.position
 
 
 def test_the_smooth_stack_aims_at_the_end_of_its_buffers_and_weights_by_them():

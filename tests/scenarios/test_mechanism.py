@@ -7,7 +7,6 @@ import pinocchio as pin
 import pytest
 from mechanisms import four_bar
 from standing import IDEAL, accelerations
-from urdf_text import LIMIT, joint, link, urdf
 
 from hierarchy import Robot, State, plugins
 from hierarchy.contacts import Contacts
@@ -176,17 +175,6 @@ def test_a_start_is_closed_where_it_names_no_joint_and_refused_where_it_cannot_b
         build(scenario(start={"q": [2.0, 0.0, 0.0, 0.0, 0.0, 0.0]}))
 
 
-def test_couplings_that_contradict_each_other_are_said_where_a_robot_is_checked(tmp_path, command):
-    """Only a run said so: its start was refused."""
-    follow = LIMIT + '<mimic joint="{}" offset="0.2"/>'
-    path = tmp_path / "circle.urdf"
-    path.write_text(urdf(*map(link, "abc"),
-                         joint("one", "revolute", "a", "b", follow.format("two")),
-                         joint("two", "revolute", "b", "c", follow.format("one"))))
-    assert ("posture near rest that closes the mechanism: couplings one = 1 two + 0.2 in the file: "
-            "it stays open by 0.2") in command("check", path).out
-
-
 def test_joints_of_a_mechanism_that_a_posture_names_reach_their_values():
     """The others, at rest, once pulled them back: the crank came to rest at -0.48."""
     asked, robot, memory = {"crank": -0.3, "finger": 0.5}, four_bar(), None
@@ -199,30 +187,6 @@ def test_joints_of_a_mechanism_that_a_posture_names_reach_their_values():
     for end in (q, run["q"][-1]):
         values = robot.values(end)
         assert {name: values[name] for name in asked} == pytest.approx(asked, abs=1e-6)
-
-
-@pytest.mark.parametrize(("level", "measurement"), [
-    ("velocity", {}), ("acceleration", {"quantisation": 1e-5, "velocity": "differenced"})])
-def test_a_mobile_base_goes_to_a_posture_by_values(level, measurement, tmp_path):
-    (tmp_path / "m.urdf").write_text(urdf(
-        *(link(name, "") for name in ("world", "body", "a", "b")),
-        joint("base", "planar", "world", "body", "", "0 0 1"),
-        joint("turn", "continuous", "body", "a", "", "0 0 1"), joint("tilt", "revolute", "a", "b")))
-    goal = {"base": [0.4, -0.2, 2.8], "turn": -3.0, "tilt": 0.5}
-    data = {"name": "m", "robot": {"model": "m.urdf"}, "plant": {"measurement": measurement},
-            "start": {"joints": {"base": [0.1, 0.2, 0.3], "turn": 2.0}},
-            "control": {"level": level, "stack": "hierarchical", "resolver": "hcod",
-                        "duration": 2.0, "period": 0.002},
-            "tasks": [posture(goal)]}
-    run = simulate(Scenario.model_validate(data))
-    found = Robot.load("m.urdf").values(run["q"][-1])
-    for name, value in goal.items():
-        np.testing.assert_allclose(found[name], value, atol=1e-4)
-    turned = np.unwrap(np.arctan2(run["q"][:, 5], run["q"][:, 4]))
-    assert np.ptp(turned) == pytest.approx(2 * np.pi - 5.0, abs=1e-2), "the short way"
-    data["start"]["joints"]["turn"] = [1.0, 1.0]
-    with pytest.raises(ScenarioError, match="start: joint 'turn'"):
-        build(Scenario.model_validate(data))
 
 
 @pytest.mark.parametrize("crank", [3.138, 3.1395])

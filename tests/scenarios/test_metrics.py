@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 from hand_made import asked, recording
 
-from hierarchy import plugins
 from scenarios import load, simulate
 from scenarios.measure.metrics import Metric, as_plain_data, measure
 from scenarios.recording import listed
@@ -92,15 +91,3 @@ def test_frozen_returned_and_jerk_are_counted(spans, frozen, returned):
     assert found["error_returned_rms"].value == (
         pytest.approx(np.sqrt(np.mean(error[returned]**2))) if returned else None)
     assert found["jerk_max"].value == 2.0
-
-
-@pytest.mark.parametrize(("yields", "said"), [
-    (lambda *_: [1 / 0], "ZeroDivisionError: division by zero"),
-    (lambda *_: [3], "expected a Metric"),
-    (lambda *_: [Metric("a", "A", np.nan, "")], "'a': value = nan: expected a finite number"),
-    (lambda *_: [Metric("a", "A", 1.0, None)], "'a': unit: expected a str")])
-def test_a_metric_of_a_plug_in_that_fails_is_left_out_and_said(monkeypatch, yields, said):
-    usual = measure(recording())
-    monkeypatch.setitem(plugins._registered["metrics"], "mine", yields)
-    with pytest.warns(UserWarning, match=f"metrics 'mine'.*{said}"):
-        assert measure(recording()).keys() == usual.keys()

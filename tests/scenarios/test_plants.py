@@ -9,7 +9,6 @@ from scene import FRAME, ROBOT, place_of
 from hierarchy import Hierarchy, State
 from hierarchy.avoidance import Obstacles
 from scenarios import load, simulate
-from scenarios.cell.build import build
 from scenarios.cell.plants import Apart, JointSensor, KinematicArm, PhysicsArm
 from scenarios.config.sections.plant import MeasurementSection, PhysicsSection
 from scenarios.loop.audit import ActiveSets
@@ -111,12 +110,6 @@ def test_the_controller_sees_what_is_measured_and_nothing_else(mujoco, changes):
     for k in range(run.ticks):
         command = controller.command(run["t"][k], run["q"][k], run["v"][k])
         np.testing.assert_array_equal(command, run["command"][k])
-
-
-def test_a_capsule_without_length_is_a_ball(mujoco):
-    ball = "robot.capsules=[{joint='joint_2', start=[0, 0, 0], end=[0, 0, 0], radius=0.1}]"
-    plant = build(load("ellipse", [*PHYSICS, ball])).plant.true
-    assert plant.model.geom("joint_2 1").type == mujoco.mjtGeom.mjGEOM_SPHERE
 
 
 @pytest.mark.parametrize("level", ["acceleration", "velocity"])

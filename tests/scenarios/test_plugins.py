@@ -22,12 +22,16 @@ MODULE = '''
 from dataclasses import dataclass
 from typing import ClassVar
 
-from hierarchy import Robot
+import numpy as np
+from hierarchy import Robot, Task
 from hierarchy.paths import Path
 from hierarchy.plugins import register
 from hierarchy.robot import Frame
 from hierarchy.tasks import JointCoupling, Position
 from scenarios.cell.plants import KinematicArm
+from scenarios.draw.figures.panels import Panel
+from scenarios.measure.metrics import Metric
+from scenarios.recording.signals import Signal
 from solvers import Resolution, Resolver, make
 
 @register("tasks", "elbow")
@@ -60,11 +64,6 @@ class Weak(KinematicArm):
 
     def act(self, command):
         super().act(self.share * command)
-'''
-
-BRITTLE = '''
-import numpy as np
-from hierarchy import Task
 
 @register("tasks", "brittle")
 @dataclass(frozen=True)
@@ -83,11 +82,6 @@ class Brittle(Task):
 
     def jacobian_derivative(self, state):
         return np.zeros((1, 7))
-'''
-
-ODD = '''
-import numpy as np
-from scenarios.measure.metrics import Metric
 
 @register("plants", "odd")
 class Odd(KinematicArm):
@@ -105,9 +99,7 @@ class Odd(KinematicArm):
 @register("plants", "none")
 def none():
     return None
-'''
 
-KEPT = '''
 X = np.zeros(7)
 
 @register("resolvers", "kept")
@@ -130,6 +122,12 @@ def folder(tmp_path, monkeypatch, no_plugins):
     sys.modules.pop("doors_of_mine", None)
 
 
+def add(text, folder):
+    """Add lines to the plugin."""
+    with (folder / "doors_of_mine.py").open("a") as module:
+        module.write(f"\n{text}\n")
+
+
 @pytest.mark.parametrize("what", ["check", "run", "compare"])
 def test_a_file_alone_loads_no_code(what, command, folder):
     (folder / "doors_of_mine.py").write_text("raise SystemExit('this was run')")
@@ -143,14 +141,12 @@ def test_a_file_alone_loads_no_code(what, command, folder):
     assert "plugin 'doors_of_mine' cannot be imported: ZeroDivisionError" in text
 
 
-def test_the_kinds_of_a_plugin_are_explained_and_a_wrong_key_meets_only_its_own(command):
+def test_the_kinds_of_a_plugin_are_explained(command):
     said = command("help elbow --plugin doors_of_mine").out
     assert said.startswith('[[tasks]] with kind = "elbow"')
     assert "  joint: string, required" in said
     assert "  gain: number, default 2.0" in said
     assert '\n      "elbow": ' in command("help tasks.kind --plugin doors_of_mine").out
-    said = command("check own.toml --plugin doors_of_mine --set tasks.0.joynt=1", code=2).err
-    assert "unknown key 'tasks.0.joynt'; did you mean 'tasks.0.joint'? Known: angle," in said
 
 
 @pytest.mark.parametrize(("annotation", "value", "made"), [
@@ -160,20 +156,16 @@ def test_the_kinds_of_a_plugin_are_explained_and_a_wrong_key_meets_only_its_own(
     ("float | None", '"5"', "tasks.1.x: Input should be a valid number, got '5'"),  # was 5.0
     ("dict[str, float]", "{a = true}", "tasks.1.x.a: Input should be a valid number, got True")])
 def test_keys_that_may_be_left_out_or_are_lists_are_read_as_others(annotation, value, made, folder):
-    (folder / "doors_of_mine.py").write_text(MODULE + f"""
-@register("tasks", "shown")
-def shown(x: {annotation} = None):
-    raise ValueError(repr(x))
-""")
+    add(f'@register("tasks", "shown")\ndef shown(x: {annotation} = None):\n'
+        "    raise ValueError(repr(x))", folder)
     plugins.allow("doors_of_mine")
     refused(made, lambda: simulate(load("own.toml", [
         f"tasks.1={{kind = 'shown', x = {value}}}"])))
 
 
 def test_the_error_of_a_task_of_a_plugin_has_the_unit_that_its_class_says(folder):
-    file, scenario = folder / "doors_of_mine.py", folder / "own.toml"
-    file.write_text(MODULE + BRITTLE.replace("dimension = 1", 'dimension = 1\n    unit = "kg"\n'
-                                             '    kind = "inequality"'))
+    add("Brittle.unit, Brittle.kind = 'kg', 'inequality'", folder)
+    scenario = folder / "own.toml"
     scenario.write_text(scenario.read_text().replace('"halved"', '"hcod"')
                         + '[[tasks]]\nkind = "brittle"\nsince = 9.0\n')
     plugins.allow("doors_of_mine")
@@ -205,7 +197,6 @@ def test_the_plant_and_the_resolver_of_a_plugin_do_what_they_say():
     ("exit('bye')", "task 'brittle': SystemExit: bye ({file}, line {line})")])
 def test_a_task_that_fails_is_named_and_what_was_run_is_kept(fault, said, command, folder):
     file, scenario = folder / "doors_of_mine.py", folder / "own.toml"
-    file.write_text(MODULE + BRITTLE)
     said = said.format(file=file, line=file.read_text().partition("eval")[0].count("\n") + 1)
     asked = f'[[tasks]]\nkind = "brittle"\nfault = "{fault}"\n'
     scenario.write_text(scenario.read_text() + asked + "since = 0.1")
@@ -220,7 +211,6 @@ def test_a_task_that_fails_is_named_and_what_was_run_is_kept(fault, said, comman
 
 def with_plant(folder, keys):
     """Give the scenario another plant."""
-    (folder / "doors_of_mine.py").write_text(MODULE + ODD)
     scenario = folder / "own.toml"
     scenario.write_text(scenario.read_text().replace('"weak", share = 0.5', keys))
 
@@ -258,8 +248,6 @@ def test_a_plant_that_fails_is_named_and_what_was_run_is_kept(fault, said, comma
 
 def test_arrays_that_a_plugin_keeps_and_overwrites_are_its_own(command, folder):
     with_plant(folder, '"odd", then = "command[:] = 99.0"')
-    with (folder / "doors_of_mine.py").open("a") as module:
-        module.write(KEPT)
     command("run own.toml --plugin doors_of_mine --resolver kept --out a")
     command("run own.toml --plugin doors_of_mine --resolver hcod --set plant.then=pass --out b")
     np.testing.assert_array_equal(load_run("a")["command"], load_run("b")["command"])
@@ -274,11 +262,11 @@ def test_arrays_that_a_plugin_keeps_and_overwrites_are_its_own(command, folder):
     ("yield Metric('stack_changes', 'S', 77.0, '')", "metrics 'own' are left out: others yield "
      "'stack_changes' too"),
     ("yield from [Metric('own', 'O', 77.0, '')] * 2", "are left out: others yield 'own' too"),
-    ("yield recording['q'].mean()", "what it yields[0]: expected a Metric, got float64")])
+    ("yield recording['q'].mean()", "what it yields[0]: expected a Metric, got float64"),
+    ("yield Metric('own', 'O', np.nan, '')", "'own': value = nan: expected a finite number"),
+    ("yield Metric('own', 'O', 77.0, None)", "'own': unit: expected a str")])
 def test_metrics_that_fail_are_left_out_and_the_run_is_kept(body, said, command, folder):
-    with_plant(folder, '"odd"')
-    with (folder / "doors_of_mine.py").open("a") as module:
-        module.write(f"\n@register('metrics', 'own')\ndef own(recording, by):\n    {body}\n")
+    add(f"@register('metrics', 'own')\ndef own(recording, by):\n    {body}", folder)
     with pytest.warns(UserWarning, match=re.escape(said)):
         command("run own.toml --plugin doors_of_mine --out a")
     assert '"value": 77.0' not in (folder / "a" / "metrics.json").read_text()
@@ -313,9 +301,8 @@ def test_a_scenario_with_own_kinds_is_copied_and_pickled(folder):
 
 
 @pytest.mark.parametrize(("change", "said"), [
-    ("tasks.0.angel=1.0", "unknown key 'tasks.0.angel'; did you mean 'tasks.0.angle'?"),
+    ("tasks.0.angel=1", "unknown key 'tasks.0.angel'; did you mean 'tasks.0.angle'? Known: angle,"),
     ("tasks.0.angle=true", "tasks.0.angle: Input should be a valid number, got True"),
-    ("tasks.2.angle=1.0", "[tasks] has 2 entries, numbered from 0, and no '2'"),
     ("tasks.1.path.kind=spiral", "tasks.1.path: unknown kind 'spiral'. Known: circle"),
     ("tasks.0.kind=elbwo", "tasks.0: unknown kind 'elbwo'; did you mean 'elbow'?"),
     ("control.resolver=havled", "unknown resolver 'havled'; did you mean 'halved'?"),
@@ -349,12 +336,13 @@ def test_a_name_of_an_entry_point_is_found_without_being_imported_first(group, l
 
 
 @pytest.mark.parametrize(("line", "change", "said"), [
-    ("register('plants', 'odd')(3)", "plant.kind=odd", "plant of kind 'odd': TypeError: 3 is not a "
-     "callable object"),
+    ("register('plants', 'three')(3)", "plant.kind=three", "plant of kind 'three': TypeError: 3 is "
+     "not a callable object"),
     ("register('robots', 'odd')(lambda: 1 / 0)", "robot.model=odd", "robot 'odd' of a plugin: "
      "ZeroDivisionError: division by zero"),
-    ("register('resolvers', 'odd')(lambda: make('hcod'))", "control.resolver=odd", "resolver 'odd' "
-     "of a plugin: expected a class of Resolver, got function"),
+    *((f"register('resolvers', 'odd')({made})", "control.resolver=odd", "resolver 'odd' of a "
+       f"plugin: expected a class of Resolver, got {got}")
+      for made, got in (("lambda: make('hcod')", "function"), ("int", "type"))),
     ("register('resolvers', 'odd')(type('Odd', (Halved,), {'__post_init__': lambda self: 1 / 0}))",
      "control.resolver=odd", "resolver 'odd': ZeroDivisionError: division by zero"),
     ("register('resolvers', 'odd')(type('Odd', (Halved,), {'accuracy': float('nan')}))",
@@ -365,15 +353,12 @@ def test_a_name_of_an_entry_point_is_found_without_being_imported_first(group, l
     ("register('tasks', 'odd')(type('Odd', (JointCoupling,), {'dimension': 1.5}))",
      "tasks.0={kind='odd', joints={joint_1=1.0}, value=0.1}", "task 'odd': dimension = 1.5: "
      "expected a whole number"),
-    ("from scenarios.recording.signals import Signal; register('signals', 'file')(Signal('odd', "
-     "'Pa', '(T,)', '')); register('plants', 'odd')(type('Odd', (KinematicArm,), {'__init__': "
-     "lambda self, robot, q, v, period, level: KinematicArm.__init__(self, robot, q, v, period, "
-     "level) or setattr(self, 'extra', {'file': q[0]})}))", "plant={kind='odd'}", "signals: 'file' "
-     "is registered with a Signal called 'odd'"),
+    ("register('signals', 'file')(Signal('odd', 'Pa', '(T,)', ''))", "plant={kind='odd', made='"
+     "self.extra = {\"file\": q[0]}'}", "signals: 'file' is registered with a Signal called 'odd'"),
     ("register('sensors', 'odd')(lambda exact: exact.measurement)", "sensor.kind=odd",
      "sensor of kind 'odd': Measurement <")])
 def test_what_is_registered_and_no_such_thing_is_named(line, change, said, folder):
-    (folder / "doors_of_mine.py").write_text(f"{MODULE}{line}\n")
+    add(line, folder)
     plugins.allow("doors_of_mine")
     avoiding = ["avoidance={kind = 'separation', obstacles = [{centre = [0.6, 0.6, 0.6]}]}"]
     refused(said, lambda: simulate(load("own.toml", [change, *avoiding * ("sensor" in change)])))
@@ -384,35 +369,25 @@ def test_what_is_registered_and_no_such_thing_is_named(line, change, said, folde
     ("register('robots', 'kuka_lwr')(my_arm)", "robots: 'kuka_lwr' is already"),  # this too
     ("from solvers.resolver import register as add; Halved.name = 'hcod'; add(Halved)",
      "resolvers: 'hcod' is already solvers.resolvers.hcod.Hcod"),  # took the place of hcod
+    ("register('tasks', 'elbow')(Weak)", "tasks: 'elbow' is already"),
+    ("register('task', 'odd')", "unknown group 'task'; did you mean 'tasks'"),
     ("register('tasks', 'odd')(None)", "tasks: 'odd' is None"),
     ("register('tasks', Weak)", "tasks: name: expected a str, got type"),
-    ("from scenarios.recording.signals import Signal; Signal('odd', 'Pa', (3,), '')",
-     "signal 'odd': shape: expected a str, got tuple (3,)"),
-    ("from scenarios.recording.signals import Signal; Signal('odd', 'Pa', '(T,)', '', '/tf')",
-     "signal 'odd': topic = '/tf': expected / and a word, none of /tf, "),  # broke its messages
-    ("from scenarios.recording.signals import Signal; Signal('file', 'Pa', '(T,)', '')",
-     "signal 'file': a name has letters, digits and \"_\"")])  # lost the run
+    ("Signal('odd', 'Pa', (3,), '')", "signal 'odd': shape: expected a str, got tuple (3,)"),
+    ("Signal('odd', 'Pa', '(T,)', '', '/tf')",  # broke its messages
+     "signal 'odd': topic = '/tf': expected / and a word, none of /tf, "),
+    ("Signal('file', 'Pa', '(T,)', '')", "signal 'file': a name has letters, digits and \"_\"")])
 def test_what_cannot_be_registered_is_refused_on_import(line, said, folder):
-    (folder / "doors_of_mine.py").write_text(f"{MODULE}{line}\n")
+    add(line, folder)
     refused(f"plugin 'doors_of_mine' cannot be imported: {said}", plugins.allow, "doors_of_mine")
     assert type(make("hcod")).__name__ == "Hcod"
     refused("'./mine.py': give the name of a module", plugins.allow, "./mine.py")
 
 
 def test_a_figure_that_fails_is_left_out_of_the_page(command, folder, undrawn):
-    figures = ("from scenarios.draw.figures.panels import Panel\nregister('figures', 'odd')(Panel("
-               "'odd', 'Odd', 'rad', 'q', lambda ax, run, colour: exit(3)))\n")
-    robot = "register('robots', 'same')(Robot.named('kuka_lwr'))\n"
-    (folder / "doors_of_mine.py").write_text(f"{MODULE}{figures}{robot}")
+    add("register('figures', 'odd')(Panel('odd', 'Odd', 'rad', 'q', lambda *_: exit(3)))\n"
+        "register('robots', 'same')(Robot.named('kuka_lwr'))", folder)
     with pytest.warns(UserWarning, match="figure 'odd' is left out: SystemExit: 3"):
         command("compare own.toml --plugin doors_of_mine --resolvers hcod,tpm --out a --workers 1 "
                 "--set robot.model=same")
     assert "Side by side" in (folder / "a" / "index.html").read_text()
-
-
-def test_two_things_of_one_name_are_refused():
-    plugins.register("tasks", "thing")(type("One", (), {}))
-    refused("tasks: 'thing' is already", plugins.register("tasks", "thing"), type("Two", (), {}))
-    refused("unknown group 'task'; did you mean 'tasks'", plugins.register, "task", "thing")
-    plugins.register("resolvers", "whole")(int)
-    refused("resolver 'whole' of a plugin: expected a class of Resolver", make, "whole")

@@ -41,12 +41,6 @@ def test_halves_are_reproducible_and_never_the_same(name):
     assert len({one.half(seed, 2).digest for seed in (0, 1, 2)}) == 3
 
 
-def test_more_problems_than_a_public_set_has_are_refused_and_nothing_is_written(command, tmp_path):
-    said = command("problems export EQ7 --count 51 --out", tmp_path / "out", code=2).err
-    assert "family 'EQ7': its public set has 50 problems, not 51" in said
-    assert not list(tmp_path.iterdir())
-
-
 def test_ticks_of_the_humanoid_are_ten_in_a_row_after_its_push_of_runs_that_last(monkeypatch):
     asked = []
 

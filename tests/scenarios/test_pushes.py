@@ -36,14 +36,6 @@ def test_every_shipped_scenario_of_torques_can_be_replayed(name):
             np.testing.assert_allclose(now.wanted[0], path.wanted[0], atol=1e-9)
 
 
-def test_a_table_is_below_the_hand_wherever_that_starts():
-    pytest.importorskip("mujoco")
-    run = simulate(load("wipe", {"control.duration": 0.01, "start.joints": {"joint_1": 1.0}}))
-    table = scene(run).pushes.table
-    np.testing.assert_allclose(table.mean(axis=(1, 2))[:, :2], run["ee_position"][[0, -1], :2],
-                               atol=0.04)
-
-
 def test_a_cone_and_a_direction_have_no_unit():
     """Their levels were said to be missed by so many m/s²."""
     tasks = [{"kind": "look-at", "frame": "tool", "target": [1.0, 0.0, 0.0]},

@@ -12,7 +12,6 @@ import pytest
 from deadly import dies_of_one
 from refusals import refused
 
-from hierarchy import HierarchyError
 from scenarios import load, shipped, simulate
 from scenarios.config.distributions import Distribution
 from scenarios.config.sampling import drawn
@@ -150,19 +149,6 @@ def test_runs_are_made_again_after_a_file_that_a_robots_file_includes_has_change
     assert digests[0] == digests[1] != digests[2]
 
 
-@pytest.mark.parametrize(("variation", "says"), [
-    ({}, r"'ellipse' has no \[variation\]"),
-    ({"start.p": {"around": 1.0}}, r"variation\.start\.p"),
-    ({"control.options.rank_tolerance": {"around": 1.0}}, "around = 1.0 needs a value"),
-    ({"control.options.hcod.damping": {"uniform": [0.0, 1.0]}}, "options.hcod. is missing"),
-    ({"start.v": {"around": 1.0}}, "around = 1.0 needs a value in the scenario; give it one")])
-def test_a_variation_that_cannot_be_drawn_is_refused(variation, says, tmp_path):
-    with pytest.raises(HierarchyError, match=says):
-        compare_starts([load("ellipse", {**SHORT, "variation": variation})], ["hcod"], 2, 0,
-                       tmp_path / "out")
-    assert not (tmp_path / "out").exists()
-
-
 def test_the_rows_are_the_same_in_processes_in_parts_and_on_a_cluster(tmp_path, command, undrawn):
     distributed = pytest.importorskip("distributed", reason="needs the extra sweep")
     sweep = "sweep", write(tmp_path), "--out"
@@ -210,17 +196,6 @@ def test_the_distance_was_kept_by_runs_that_were_never_below_it():
     below["joint_limit_excess"] = np.full(3, np.nan)  # a robot without limits keeps to them
     found = Results(jobs, (None, None, "broke"), {}, below).shares()
     assert found["Kept the joint limits"]["tpm"] == (2, 3)
-
-
-@pytest.mark.parametrize("names", [("ellipse", "singular"), ("ellipse", "ellipse-hqp")])
-def test_what_is_not_asked_for_or_not_run_counts_for_nothing(names, tmp_path, undrawn):
-    """One of two scenarios has no obstacles; one of two is refused by the resolver."""
-    found = compare_starts([load(name, SHORT) for name in names], ["tpm"], 2, 0, tmp_path / "out",
-                           workers=Workers(1)).found
-    alone = "ellipse-hqp" in names
-    (group, results), = found.items()
-    assert (group, results.labels) == (("ellipse", ("tpm",)) if alone else ("tpm", names))
-    assert {*results.shares()["All of the above"].values()} == {(2, 2)}
 
 
 def test_runs_that_stopped_for_different_reasons_are_not_the_same():
