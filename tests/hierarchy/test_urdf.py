@@ -127,6 +127,8 @@ def test_masses_and_shapes_on_a_planar_joint_are_where_the_file_has_them(load):
     ({"limit": LIMIT.replace("-1", "0") + '<mimic joint="last" multiplier="-1"/>',
       "more": link("tip") + joint("last", "revolute", "arm", "tip", LIMIT.replace("-1", "0"))},
      "joints last do not move"),
+    ({"more": '<gazebo><joint name="x" type="revolute"/></gazebo><loop_joint name="y"/>'},
+     "joints of Gazebo, or that close a loop, x, y: left out"),
     ({"limit": LIMIT + '<safety_controller soft_upper_limit="0.5"/>'}, "soft limits of only:"),
     ({"kind": "continuous"}, "position limits of only: a continuous joint has none"),
     ({"more": link("tip", "") + joint("last", "continuous", "arm", "tip", "")},
