@@ -59,6 +59,7 @@ from hierarchy.robots.joints import (
 from hierarchy.robots.library import pin
 from hierarchy.robots.names import elsewhere, file_of, in_package, is_file_name
 from hierarchy.robots.table import Base, Table
+from hierarchy.words import some
 
 ROBOTS = TABLES
 BASE_SPEED = (2.0, 3.0)  # [m/s], [rad/s] of a floating base in inverse kinematics
@@ -188,17 +189,24 @@ class Robot:
                                if found.control_points is None else found.control_points)
         self.capsules, self.missing, self.coupled = found.capsules, found.missing, found.coupled
         self.rest = np.array(pin.neutral(model)) if found.rest is None else found.rest
-        leaders = {one.other for one in self.coupled} - {"", *(one.joint for one in self.coupled)}
-        held = {one.joint: one.at(0.0) for one in self.coupled if not one.other}
-        if leaders or held:
-            values = self.values(self.rest)
-            ends = {self.joint_names[part.joint - 1]: (self.lower[part.q], self.upper[part.q])
-                    for part in self.parts if part.size == 1}
-            self.rest = self.configuration(held | {
-                name: inside(float(values[name]), *room(name, ends, self.coupled))
-                for name in leaders}, self.rest)
+        self._keep_couplings()
         self.loops, self.starts, self.apart = found.loops, found.starts, found.apart
         self.table = found.table
+
+    def _keep_couplings(self) -> None:
+        """Move `rest` to where the couplings have it; say which joints have no room to move."""
+        leaders = {one.other for one in self.coupled} - {"", *(one.joint for one in self.coupled)}
+        held = {one.joint: one.at(0.0) for one in self.coupled if not one.other}
+        ends = {self.joint_names[part.joint - 1]: (self.lower[part.q], self.upper[part.q])
+                for part in self.parts if part.size == 1}
+        rooms = {name: room(name, ends, self.coupled) for name in (*ends, *leaders)}
+        if still := [name for name, (low, high) in rooms.items() if low == high]:
+            self.missing += (f"joints {some(still)} do not move: their position limits, 0 where a "
+                             "URDF has none, and those of joints that follow leave no room",)
+        if leaders or held:
+            values = self.values(self.rest)
+            self.rest = self.configuration(held | {
+                name: inside(float(values[name]), *rooms[name]) for name in leaders}, self.rest)
 
     @classmethod
     def named(cls, name: str, base: Base | None = None) -> Robot:

@@ -310,6 +310,8 @@ def remarks(root: Element) -> Iterator[str]:
         yield (f"what the macros {some(macros, _MACROS)} stand for is not in the robot; {EXPAND}")
     joints, flaws = root.findall("joint"), [(_flaw(link), link) for link in root.findall("link")]
     for what, why, found in (
+            ("joints of Gazebo, or that close a loop,", "left out; a URDF is a tree", [
+                *root.findall("gazebo/joint"), *root.findall("loop_joint")]),
             ("limits of", "a floating or planar joint has none", [
                 joint for joint in joints if joint.find("limit") is not None
                 and joint.get("type") in ("floating", "planar")]),
