@@ -191,7 +191,7 @@ class Packed:
         """Put rows (k, n) and sides (k,) into the table; return what it has of them."""
         n, first = self.n, self.filled
         self.filled = last = first + len(sides)
-        if rows.shape != (last - first, n):
+        if np.atleast_2d(rows).shape != (last - first, n):  # as pink and mink stack them
             name = what if isinstance(what, str) else label(what)
             raise HierarchyError(f"{name}: {rows.shape} rows for {sides.shape} values and {n} "
                                  "unknowns")

@@ -74,6 +74,12 @@ def wall(configuration, room, gain, safe):
                    safe_displacement_gain=safe)
 
 
+def ball(room=0.718):
+    from pink.barriers import BodySphericalBarrier  # its Jacobian has one dimension
+
+    return BodySphericalBarrier(("joint_2", "end_effector"), room, 20.0)
+
+
 def still():
     """Return a barrier of a frame that no joint moves."""
     return SimpleNamespace(safe_displacement_gain=1.0, compute_qp_inequalities=lambda *_: None,
@@ -101,6 +107,7 @@ SCENES = {
     "no limits, little damping": lambda c: arm_scene(c, lm_damping=50.0, damping=1e-3, limits=[]),
     "barrier": lambda c: arm_scene(c, barriers=[wall(c, 1e-3, 1.0, 0.0)]),
     "barrier with a safe displacement": lambda c: arm_scene(c, barriers=[wall(c, 1e-3, 9.0, 0.7)]),
+    "barrier between two frames": lambda c: arm_scene(c, barriers=[ball()]),
     "a barrier alone": lambda c: (c, [], {"barriers": [wall(c, 1.0, 9.0, 0.05)]}),
     "one row": lambda c: (c, [posture_task(Q + 0.1)], {}),
     "humanoid": humanoid_scene}
