@@ -115,7 +115,10 @@ def _signed_rank(apart: Array) -> tuple[float, float]:
 
     Exact up to EXACT pairs; with ties, scipy is not, or tries all signs, which takes a second.
     """
-    _, place, count = np.unique(np.abs(apart), return_inverse=True, return_counts=True)
+    sizes = np.sort(np.abs(apart))
+    ties = sizes[np.diff(sizes, prepend=-1.0) > NOTHING]  # the least of those equal to rounding
+    place = np.searchsorted(ties, np.abs(apart), side="right") - 1
+    count = np.bincount(place)
     ranks = (2 * np.cumsum(count) - count + 1)[place]  # twice the mean rank of those that are equal
     signed = float(np.sign(apart) @ ranks / max(ranks.sum(), 1))
     if apart.size < FEWEST:
@@ -123,7 +126,7 @@ def _signed_rank(apart: Array) -> tuple[float, float]:
     if apart.size > EXACT:
         from scipy.stats import wilcoxon
 
-        return float(wilcoxon(apart, method="asymptotic").pvalue), signed
+        return float(wilcoxon(np.sign(apart) * ranks, method="asymptotic").pvalue), signed
     ways = np.zeros(ranks.sum() + 1)  # in which signs give each sum of positive ranks
     ways[0] = 1.0
     for rank in ranks:

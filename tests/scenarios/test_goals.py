@@ -116,6 +116,8 @@ def test_the_p_value_is_that_of_all_signs_with_and_without_ties(seed):
     for count, method in ((EXACT, "exact"), (EXACT + 1, "asymptotic")):
         apart = 0.2 + random.normal(size=count)
         assert paired(np.zeros(count), apart).p == pytest.approx(wilcoxon(apart, method=method)[1])
+        counts = random.integers(50, 900, count) + random.integers(0, 5, (2, count))
+        assert paired(*counts / 1257.0).p == paired(*counts * 8.0).p  # shares tie to rounding
 
 
 def test_pairs_are_counted_by_their_direction_and_too_few_tell_nothing():
