@@ -148,8 +148,9 @@ def best(columns: Mapping[str, Array], lower_is_better: bool, level: float = LEV
     known = {label: np.isfinite(values) for label, values in cost.items()}
     if len(known) < 2 or not all(one.any() for one in known.values()):
         return ()
-    medians = {label: float(np.nanmedian(values)) for label, values in cost.items()}
-    first = min(medians, key=lambda label: medians[label])
+    middle = {label: (round(float(np.nanmedian(values)), 9), float(np.nanmean(values)))
+              for label, values in cost.items()}  # counts often have the same median
+    first = min(middle, key=lambda label: middle[label])
     against = {label: paired(cost[first], values) for label, values in cost.items()}
     other = [one for one in against.values() if not one.equal]
     if not other or max(holm([one.p for one in other])) >= level:
