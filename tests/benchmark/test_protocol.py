@@ -41,6 +41,9 @@ def test_an_effect_counts_only_if_its_whole_interval_is_beyond_what_matters():
         assert found.decided == expected
     assert found.p < 1e-6
     assert verdict(rows(x=x, y=y), above="y", percent=True, matters=5.0).decided == "contradicted"
+    same = np.where(np.arange(SIZE) < SIZE // 2, y, y - 10.0)  # on the first layout
+    for side in ("below", "above"):
+        assert verdict(rows(x=same, y=y), **{side: "y"}, matters=0.0).decided.startswith("differs")
     assert verdicts.shown(found.claim, rows(x=x, y=y), found.effect).startswith("-19.8 [")
 
 
