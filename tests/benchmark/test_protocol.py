@@ -122,6 +122,16 @@ def test_trials_that_are_left_out_of_the_second_scene_are_not_on_the_front(monke
     assert sum(ran[1:]) < 30
 
 
+def test_the_test_of_a_front_gives_medians_and_none_where_half_of_the_scenes_fail(monkeypatch):
+    one = fronts.Front("ellipse", ["x", "y"], {"strict": {"resolver": "hcod"}})
+    scores = np.array([[[3.0, 1.0], [1.0, 2.0], [2.0, np.inf], *[[8.0, np.inf]] * 2, [4.0, 9.0]]])
+    monkeypatch.setattr(fronts, "FRONTS", {"one": one})
+    monkeypatch.setattr(fronts, "_trained", lambda *_: scores[:, 0])
+    monkeypatch.setattr(fronts, "_scores", lambda *_: (scores, ["m", "m"]))
+    (point,) = fronts.run(Path(), Workers())
+    assert (point.test, point.kept) == ([3.5, None], 3)
+
+
 ROOT = Path(__file__).parents[2]
 PAGES = pages.marked(ROOT)
 STORED = blocks.Stored.read(ROOT)
