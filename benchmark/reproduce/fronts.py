@@ -91,8 +91,7 @@ def run(out: Path, workers: Workers, progress: Progress | None = None) -> list[P
         scores, units = _scores(name, method, [trials[k] for k in best],
                                 (GIVEN["seed"] + 1, GIVEN["test"]), where)
         kept = np.isfinite(scores).all(axis=2).sum(axis=1).tolist()
-        with np.errstate(invalid="ignore"):
-            test = np.sort(scores, axis=1)[:, GIVEN["test"] // 2]
+        test = np.median(scores, axis=1)
         found += [Point(name, label, trials[k], _plain(training[k]), _plain(test[i]), kept[i],
                         GIVEN["test"], units) for i, k in enumerate(best)]
     return found

@@ -96,7 +96,7 @@ def _verdict(protocol: Protocol, claim: Claim, effect: Effect, layouts: Sequence
         return NEGLIGIBLE
     if p >= protocol.level or (low < matters and high > -matters):
         return UNDECIDED
-    sides = {bool(one.estimate > middle) for one in layouts}
+    sides = {float(np.sign(one.estimate - middle)) for one in layouts}
     return DIFFERS if len(sides) > 1 else SUPPORTED if low > 0.0 else CONTRADICTED
 
 

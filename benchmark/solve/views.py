@@ -116,7 +116,8 @@ def lead(title: str, total: Sequence[Row], cells: Sequence[Row]) -> list[str]:
         own = next((row for row in some if row["entrant"] == best[0]), None)
         if own is None or not own["asked"]:  # it refuses the family, or others were added later
             continue
-        other = max(some, key=lambda row: (row["entrant"] in widely) * row["right"])
+        other = max((row for row in some if row["entrant"] in widely and row["asked"]),
+                    key=lambda row: row["right"])
         if other["right"] > own["right"]:
             better.append(f"{family} ({other['entrant']}, {percent(other['right'])} against "
                           f"{percent(own['right'])})")

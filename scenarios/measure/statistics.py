@@ -115,7 +115,10 @@ def _signed_rank(apart: Array) -> tuple[float, float]:
 
     Exact up to EXACT pairs; with ties, scipy is not, or tries all signs, which takes a second.
     """
-    _, place, count = np.unique(np.abs(apart), return_inverse=True, return_counts=True)
+    sizes = np.sort(np.abs(apart))
+    ties = sizes[np.diff(sizes, prepend=-1.0) > NOTHING]  # the least of those equal to rounding
+    place = np.searchsorted(ties, np.abs(apart), side="right") - 1
+    count = np.bincount(place)
     ranks = (2 * np.cumsum(count) - count + 1)[place]  # twice the mean rank of those that are equal
     signed = float(np.sign(apart) @ ranks / max(ranks.sum(), 1))
     if apart.size < FEWEST:
@@ -123,7 +126,7 @@ def _signed_rank(apart: Array) -> tuple[float, float]:
     if apart.size > EXACT:
         from scipy.stats import wilcoxon
 
-        return float(wilcoxon(apart, method="asymptotic").pvalue), signed
+        return float(wilcoxon(np.sign(apart) * ranks, method="asymptotic").pvalue), signed
     ways = np.zeros(ranks.sum() + 1)  # in which signs give each sum of positive ranks
     ways[0] = 1.0
     for rank in ranks:
@@ -145,8 +148,9 @@ def best(columns: Mapping[str, Array], lower_is_better: bool, level: float = LEV
     known = {label: np.isfinite(values) for label, values in cost.items()}
     if len(known) < 2 or not all(one.any() for one in known.values()):
         return ()
-    medians = {label: float(np.nanmedian(values)) for label, values in cost.items()}
-    first = min(medians, key=lambda label: medians[label])
+    middle = {label: (round(float(np.nanmedian(values)), 9), float(np.nanmean(values)))
+              for label, values in cost.items()}  # counts often have the same median
+    first = min(middle, key=lambda label: middle[label])
     against = {label: paired(cost[first], values) for label, values in cost.items()}
     other = [one for one in against.values() if not one.equal]
     if not other or max(holm([one.p for one in other])) >= level:

@@ -40,8 +40,8 @@ def sampled_page(plan: Plan, found: Mapping[str, Results], folder: Path, command
     """
     sweep, made_by = plan.sweep, "sweep" if file else "compare --starts"
     labels = listed(list(dict.fromkeys(run.label for run in plan.runs)))
-    count = (f"{counted(len(plan.runs), 'run')}: {counted(sweep.samples, 'sample')}, each under "
-             f"{labels}")
+    samples = len({run.sample for run in plan.runs})  # without those drawn twice
+    count = f"{counted(len(plan.runs), 'run')}: {counted(samples, 'sample')}, each under {labels}"
     each = {one.name: [  # key, distribution and unit of each parameter
         (key, str(how), unit_at(Scenario, key.split("."))) for key, how in (
             (one.variation if sweep.variation else {}) | sweep.parameters).items()]

@@ -167,6 +167,8 @@ def test_the_best_may_lack_a_family_that_another_was_asked_later():
     some = [row("best", "a", 100, 1.0), row("other", "a", 100, 0.5), row("other", "b", 2, 0.5)]
     for refused in ([], [row("best", "b", 0, np.nan)]):
         assert "More often right than best: none." in views.lead("", total, [*some, *refused])
+    of = row("equalities", "a", 0, np.nan), row("best", "a", 100, 0.9), row("other", "a", 100, 1.0)
+    assert "More often right than best: a (other, 100% against 90.0%)." in views.lead("", total, of)
 
 
 def test_a_set_that_nobody_can_be_asked_has_its_tables():

@@ -41,6 +41,9 @@ def test_an_effect_counts_only_if_its_whole_interval_is_beyond_what_matters():
         assert found.decided == expected
     assert found.p < 1e-6
     assert verdict(rows(x=x, y=y), above="y", percent=True, matters=5.0).decided == "contradicted"
+    same = np.where(np.arange(SIZE) < SIZE // 2, y, y - 10.0)  # on the first layout
+    for side in ("below", "above"):
+        assert verdict(rows(x=same, y=y), **{side: "y"}, matters=0.0).decided.startswith("differs")
     assert verdicts.shown(found.claim, rows(x=x, y=y), found.effect).startswith("-19.8 [")
 
 
@@ -117,6 +120,16 @@ def test_trials_that_are_left_out_of_the_second_scene_are_not_on_the_front(monke
     assert ([k for k in range(40) if not fronts.dominated(found, k)]
             == [k for k in range(40) if not fronts.dominated(whole, k)])
     assert sum(ran[1:]) < 30
+
+
+def test_the_test_of_a_front_gives_medians_and_none_where_half_of_the_scenes_fail(monkeypatch):
+    one = fronts.Front("ellipse", ["x", "y"], {"strict": {"resolver": "hcod"}})
+    scores = np.array([[[3.0, 1.0], [1.0, 2.0], [2.0, np.inf], *[[8.0, np.inf]] * 2, [4.0, 9.0]]])
+    monkeypatch.setattr(fronts, "FRONTS", {"one": one})
+    monkeypatch.setattr(fronts, "_trained", lambda *_: scores[:, 0])
+    monkeypatch.setattr(fronts, "_scores", lambda *_: (scores, ["m", "m"]))
+    (point,) = fronts.run(Path(), Workers())
+    assert (point.test, point.kept) == ([3.5, None], 3)
 
 
 ROOT = Path(__file__).parents[2]

@@ -102,6 +102,8 @@ def test_the_p_value_is_that_of_all_signs_with_and_without_ties(seed):
     for count, method in ((EXACT, "exact"), (EXACT + 1, "asymptotic")):
         apart = 0.2 + random.normal(size=count)
         assert paired(np.zeros(count), apart).p == pytest.approx(wilcoxon(apart, method=method)[1])
+        counts = random.integers(50, 900, count) + random.integers(0, 5, (2, count))
+        assert paired(*counts / 1257.0).p == paired(*counts * 8.0).p  # shares tie to rounding
 
 
 def test_pairs_are_counted_by_their_direction_and_too_few_tell_nothing():
@@ -148,6 +150,8 @@ HOLES = np.where(np.arange(16) < 3, np.nan, 0.0)
     ([LOW, np.where(LOW < 1.2, LOW + 1.0, LOW)], True, (0,)),
     ([LOW, LOW + 1.0 + HOLES], True, (0,)), ([LOW + HOLES, LOW + 1.0], True, ()),
     ([LOW, LOW + 1.0, LOW + HOLES], True, ()),
+    ([np.full(16, 2.0), np.repeat([2.0, 3.0], [9, 7])], True, (0,)),
+    ([np.repeat([2.0, 3.0], [9, 7]), np.full(16, 2.0)], True, (1,)),  # the medians are equal
     ([np.zeros(8), *(APART * (1.0 + 0.01 * i) for i in range(10))], True, ())])
 def test_the_best_is_marked_with_those_equal_to_it_where_all_others_can_be_told_from_it(
         columns, lower, marked):

@@ -126,6 +126,8 @@ def test_all_resolvers_see_the_same_samples_and_no_run_is_planned_twice(tmp_path
     planned = plan(load_sweep(write(tmp_path, "", scenarios='["ellipse-hqp", "ellipse"]')))
     assert {one.scenario for one in planned.runs} == {"ellipse"}  # others cannot resolve it
     assert (len(planned.runs), len(planned.refused)) == (2, 2)  # all samples are the same
+    page = sampled_page.sampled_page(planned, {}, tmp_path, "", "")
+    assert "2 runs: 1 sample, each under tpm and recursive" in page
 
 
 def test_runs_are_made_again_after_a_file_that_their_scenario_names_has_changed(tmp_path):
