@@ -91,7 +91,7 @@ class KernelCache(NullCache):  # type: ignore[misc]
                 calls = [library.kernel for library in made.library.calls]
                 symbols = [found(name).overloads[kinds].fndesc.llvm_func_name
                            for name, kinds in calls]
-                _write(file, dumps((calls, symbols, made._reduce())))
+                write(file, dumps((calls, symbols, made._reduce())))
             except OSError as error:
                 _say_lost(f"{file.parent}: {error.strerror}")
 
@@ -115,14 +115,20 @@ def _read(file: Path) -> bytes | None:
             if sys.platform != "win32" and (status.st_uid not in (0, os.getuid())
                                             or status.st_mode & (stat.S_IWGRP | stat.S_IWOTH)):
                 return None
-            content = opened.read()
+            return _body(file, opened.read())
     except OSError:
         return None
+
+
+def _body(file: Path, content: bytes) -> bytes:
+    """Return what `write` wrote into a file; raises OSError if it is damaged."""
     body = content[_CHECKSUM:]
-    return body if content[:_CHECKSUM] == _checksum(file, body) else None
+    if content[:_CHECKSUM] != _checksum(file, body):
+        raise OSError(f"{file} is damaged")
+    return body
 
 
-def _write(file: Path, body: bytes) -> None:
+def write(file: Path, body: bytes) -> None:
     """Write a file completely or not at all; others may read it."""
     file.parent.mkdir(parents=True, exist_ok=True)
     number, name = tempfile.mkstemp(dir=file.parent)
@@ -204,7 +210,7 @@ class Part:
     def read(file: Path) -> Part | None:
         """Read the index beside an object file; None if it is missing or damaged."""
         try:
-            index = json.loads(file.with_suffix(".json").read_text())
+            index = json.loads(shipped(file.with_suffix(".index")))
             return Part(file, index["calls"],
                         {call: Code(**entry) for call, entry in index["entries"].items()},
                         tuple(index["externals"]))
@@ -213,11 +219,10 @@ class Part:
 
     def write(self, code: bytes) -> None:
         """Write both files, the object first."""
-        self.file.parent.mkdir(parents=True, exist_ok=True)
-        self.file.write_bytes(code)
+        write(self.file, code)
         index = {"calls": self.calls, "externals": self.externals,
                  "entries": {call: entry._asdict() for call, entry in self.entries.items()}}
-        self.file.with_suffix(".json").write_text(json.dumps(index, indent=1))
+        write(self.file.with_suffix(".index"), json.dumps(index, indent=1).encode())
 
     @cached_property
     def engine(self) -> Any:
@@ -227,9 +232,9 @@ class Part:
         if any(llvm.address_of_symbol(name) is None for name in self.externals):
             return None
         try:
-            made = (llvm.ObjectFileRef.from_path(str(self.file)) if suits() else
-                    llvm.ObjectFileRef.from_data(self._made_here()))
-        except (OSError, RuntimeError):  # no LLVM code, or of a newer LLVM
+            made = llvm.ObjectFileRef.from_data(
+                shipped(self.file) if suits() else self._made_here())
+        except (OSError, RuntimeError):  # missing, damaged, or LLVM code of a newer LLVM
             return None
         target = llvm.Target.from_triple(llvm.get_process_triple())
         engine = llvm.create_mcjit_compiler(llvm.parse_assembly(""), target.create_target_machine())
@@ -252,7 +257,7 @@ class Part:
         made = object_code(module, here)
         with suppress(OSError):
             if file is not None:
-                _write(file, made)
+                write(file, made)
         return made
 
     def function(self, entry: Code, kernel: Any) -> Any:
@@ -297,7 +302,12 @@ def suits() -> bool:
     return not os.environ.get(NATIVE) and all(features.get(name) for name in _FEATURES)
 
 
+def shipped(file: Path) -> bytes:
+    """Return the content of a file of the package; raises OSError if it is missing or damaged."""
+    return _body(file, file.read_bytes())
+
+
 def read_code(file: Path) -> tuple[bytes, bytes]:
     """Return the digest of the functions of C in a file of LLVM code, and the code."""
-    content = file.read_bytes()
+    content = shipped(file)
     return content[:_DIGEST], content[_DIGEST:]

@@ -18,7 +18,7 @@ import numpy as np
 from llvmlite import ir
 from numba.np import arrayobj
 
-from hierarchy.jit.caching import PROCESSOR, Code, Part, read_code
+from hierarchy.jit.caching import PROCESSOR, Code, Part, read_code, write
 from hierarchy.jit.compiling import Cached
 from hierarchy.jit.inside import (
     cgutils,
@@ -161,8 +161,7 @@ def build(file: Path, of: str, calls: Sequence[str], say: Callable[[int], None],
         libraries.append(_library(functions))
     names = {name for entry in entries.values() for name in (entry.wrapper, entry.environment)}
     whole = linked(libraries, {*names, *functions})
-    file.parent.mkdir(parents=True, exist_ok=True)
-    file.with_suffix(".bc").write_bytes(_digest(functions) + stripped(whole.clone()).as_bitcode())
+    write(file.with_suffix(".bc"), _digest(functions) + stripped(whole.clone()).as_bitcode())
     hide(whole, names)
     code = object_code(whole, machine())
     externals = sorted(one.name for one in (*whole.functions, *whole.global_variables)

@@ -2,6 +2,7 @@
 
 import os
 import sys
+from contextlib import suppress
 from functools import cache
 from time import monotonic
 from typing import Any
@@ -36,8 +37,10 @@ def _is_own(event: Any) -> bool:
 
 
 def say(what: str) -> None:
-    """Say one line on stderr."""
-    print(f"task-hierarchy: {what}", file=sys.stderr, flush=True)
+    """Say one line on stderr, if somebody listens."""
+    with suppress(AttributeError, OSError, ValueError):  # none, a full disk, closed
+        sys.stderr.write(f"task-hierarchy: {what}\n")
+        sys.stderr.flush()
 
 
 @cache

@@ -4,13 +4,13 @@ import os
 import re
 import sys
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from copy import deepcopy
 from dataclasses import replace
 from pathlib import Path
 from tempfile import TemporaryFile
 from types import MappingProxyType
-from typing import Any
+from typing import IO, Any
 from xml.etree import ElementTree
 
 import numpy as np
@@ -89,13 +89,14 @@ def _printed() -> Iterator[Callable[[], list[str]]]:
     Lines that name the parser's source files are left out. Other threads wait: the process has one
     standard error, which they would put back in another order.
     """
-    with OF_PROCESS, TemporaryFile("w+", errors="replace") as file:
+    with OF_PROCESS, _unnamed() as file:
         def lines() -> list[str]:
             file.seek(0)
             return [re.sub(r"^(Error|Warning):\s*", "", line.strip()) for line in file
                     if line.strip() and not line.strip().startswith("at line ")]
 
-        sys.stderr.flush()
+        with suppress(AttributeError, OSError, ValueError):  # none, a full disk, closed
+            sys.stderr.flush()
         kept = os.dup(2)
         os.dup2(file.fileno(), 2)
         try:
@@ -103,6 +104,13 @@ def _printed() -> Iterator[Callable[[], list[str]]]:
         finally:
             os.dup2(kept, 2)
             os.close(kept)
+
+
+def _unnamed() -> IO[str]:
+    """Open a file without a name: in memory on Linux, where no folder may be writable."""
+    if hasattr(os, "memfd_create"):
+        return os.fdopen(os.memfd_create("stderr"), "w+", errors="replace")
+    return TemporaryFile("w+", errors="replace")
 
 
 def _geometry(path: Path, root: Element, model: Any) -> tuple[Any, list[str]]:

@@ -168,6 +168,14 @@ def test_compiling_is_said_once_and_not_by_a_worker(monkeypatch, capsys):
     assert capsys.readouterr().err.count("compiling kernels") == 1
 
 
+@pytest.mark.parametrize("stream", ["None", "sys.stdin"])
+def test_where_nobody_hears_that_kernels_are_not_kept_they_run_and_stdout_has_the_numbers_alone(
+        ask, stream):
+    """It was written to stdout, or the solve ended in an OSError."""
+    assert ask(f"import sys; sys.stderr = {stream}; {SOLVE}",
+               XDG_CACHE_HOME="/dev/null") == (["11.0", "1"], "")
+
+
 def test_python_cannot_call_what_is_compiled_for_other_kernels():
     for kernel in (meet, swap):
         refused(f"{kernel.py_func.__name__} is compiled for other", kernel, error=TypeError)

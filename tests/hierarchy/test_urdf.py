@@ -1,6 +1,8 @@
 """URDF files as users have them: what they mean is read, and what is lost is said."""
 
 import os
+import sys
+import tempfile
 from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
@@ -149,6 +151,15 @@ def test_threads_that_read_files_leave_the_standard_error_where_it_was(load):
         found = list(threads.map(lambda i: load(*parts, name=f"{i}.urdf").missing, range(200)))
     assert os.path.samestat(os.fstat(2), before)
     assert found == 200 * [()]
+
+
+@pytest.mark.skipif(not hasattr(os, "memfd_create"), reason="a temporary file takes its place")
+def test_a_file_is_read_without_a_folder_to_write_to_and_without_a_standard_error(
+        load, monkeypatch):
+    """In a read-only container, and with `2>&-`, both raised errors of Python."""
+    monkeypatch.setattr(tempfile, "tempdir", "/nowhere")
+    monkeypatch.setattr(sys, "stderr", None)
+    assert load(*two_joints("revolute")).n == 2
 
 
 def test_what_the_parser_refuses_and_can_only_mean_one_thing_is_read(load):

@@ -1,9 +1,9 @@
 """With the object files of kernels, the documented commands compile nothing."""
 
-import json
 import os
 import re
 import shlex
+import shutil
 import subprocess
 import sys
 from pathlib import Path
@@ -11,7 +11,7 @@ from pathlib import Path
 import numba
 import pytest
 
-from hierarchy.jit.caching import FOLDER, parts, read_code
+from hierarchy.jit.caching import FOLDER, Part, parts, read_code
 from hierarchy.jit.inside import llvm
 from scenarios.ahead.building import PARTS, is_current
 
@@ -124,10 +124,15 @@ def test_calls_that_are_listed_are_compiled_ahead_for_any_processor(tmp_path):
     (tmp_path / "cache" / "task-hierarchy").mkdir(parents=True)
     compiled(f"{FEW}sys.argv[1:] = ['solvers']{MAKE}", tmp_path)
     made = (tmp_path / "objects" / "solvers.o").stat().st_mtime_ns
-    index = json.loads((tmp_path / "objects" / "solvers.json").read_text())
-    assert list(index["entries"]) == [call]
-    for settings in ({}, {"TASK_HIERARCHY_NATIVE": "1"}):
+    assert list(Part.read(tmp_path / "objects" / "solvers.o").entries) == [call]
+    for kept, settings in (("index", {}), ("o", {}), ("bc", {"TASK_HIERARCHY_NATIVE": "1"})):
         assert compiled(f"{FEW}{ASK}", tmp_path, **settings) == []
+        file = tmp_path / "objects" / f"solvers.{kept}"
+        whole = file.read_bytes()
+        file.write_bytes(whole[:-1] + bytes([whole[-1] ^ 1]))  # it crashed, or answered wrongly
+        assert len(compiled(f"{FEW}{ASK}", tmp_path, **settings)) == 1
+        file.write_bytes(whole)
+        shutil.rmtree(tmp_path / "cache")
     compiled(f"{FEW}sys.argv[1:] = ['record']{MAKE}", tmp_path)
     assert (tmp_path / "objects" / "solvers.o").stat().st_mtime_ns > made
     assert not (tmp_path / "calls.txt").read_text()
