@@ -311,7 +311,7 @@ class Robot:
         """The unit of the position of each velocity (n): "rad" or "m"."""
         return [part.unit for part in self.parts for _ in range(part.velocities)]
 
-    @property
+    @cached_property
     def coordinate_names(self) -> list[str]:
         """The joint name of each entry of q (nq), numbered where a joint has several."""
         return self._numbered([joint.nq for joint in self.model.joints[1:]])

@@ -202,7 +202,8 @@ class _SetUp:
 
     def _now(self) -> list[object]:
         return [*(task.dimension for task in self.tasks),
-                *(value.tobytes() if isinstance(value, np.ndarray) else repr(value)
+                *(value.tobytes() if isinstance(value, np.ndarray) else
+                  repr([id(part) if isinstance(part, Task) else part for part in value])
                   for value in self.read)]
 
     def step(self, q: ArrayLike, t: float, memory: Array | None, v: ArrayLike | None) -> Step:

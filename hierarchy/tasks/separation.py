@@ -203,7 +203,12 @@ class SelfSeparation(NamedRows, Written):
 
         Which are left out: neighbours on its tree, and see `hierarchy.tasks.pairs`.
         """
-        return cls(robot.capsules, barrier, separable_pairs(robot, barrier.distance))
+        return cls(robot.capsules, barrier, tuple(separable_pairs(robot, barrier.distance)))
+
+    @property
+    def dimension(self) -> int:
+        """Number of pairs m."""
+        return len(self.indices)
 
     @property
     def row_names(self) -> tuple[str, ...]:

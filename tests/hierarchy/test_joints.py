@@ -190,6 +190,7 @@ def test_a_continuous_joint_is_locked_at_an_angle_and_holds_what_follows_it(tmp_
     free, locked = Robot.load(path), Robot.load(path, locked={"a": 1.2})
     assert locked.joint_names == ("b", "c")
     assert free.coordinate_names == ["a 1", "a 2", "b", "c 1", "c 2"], "cosine and sine"
+    assert free.coordinate_names is free.coordinate_names, "they are made once"
     q, there = locked.configuration({"b": 0.3}), free.configuration({"a": 1.2, "b": 0.3})
     np.testing.assert_allclose(State.at(locked, q).position("l2"),
                                State.at(free, there).position("l2"), atol=1e-12)
