@@ -88,9 +88,7 @@ def goals(recording: Recording) -> tuple[Goal, ...]:
 def _tasks(recording: Recording) -> Iterator[_Asked]:
     scenario = recording.scenario
     if scenario.position is not None and "position_error" in recording:
-        apart = recording["desired_position"] - true(recording, "ee_position")
-        off = np.linalg.norm(apart, axis=1)
-        yield "position", _in_words(scenario.position), "m", off, False
+        yield "position", _in_words(scenario.position), "m", recording.off_path(), False
     if scenario.pointing is not None and "pointing_error" in recording:
         for unit, off in scenario.pointing.sizes(true(recording, "pointing_error")[:, None]):
             yield ("pointing", _in_words(scenario.pointing), unit, off,

@@ -41,7 +41,7 @@ _timing = partial(Metric, group="Computing")
 def _tracking(recording: Recording, by: Criteria) -> Iterator[Metric]:
     if "position_error" not in recording:
         return
-    error = np.linalg.norm(recording["position_error"], axis=1)
+    error = recording.off_path()
     metrics = partial(_rms_and_max, group="Tracking")
     after = error[recording["t"] - recording["t"][0] >= by.settle]
     settled = f"Error after {by.settle:g} s"
@@ -49,10 +49,6 @@ def _tracking(recording: Recording, by: Criteria) -> Iterator[Metric]:
     yield from metrics("position_error", settled, after, "m", suffix="_settled")
     yield _tracks("position_error_median_settled", f"{settled}, median",
                   finite(np.median(after)) if after.size else None, "m")
-    if "true_ee_position" in recording:
-        off = recording["desired_position"] - recording["true_ee_position"]
-        error = np.linalg.norm(off, axis=1)
-        yield from metrics("true_position_error", "True position error", error, "m")
 
 
 @register("pointing")
@@ -122,7 +118,7 @@ def _left_path(recording: Recording) -> tuple[Spans, Array] | None:
     position = recording.scenario.position
     path = position.path if position else None
     if path is not None and path.out_of_reach and "position_error" in recording:
-        return path.out_of_reach, np.linalg.norm(recording["position_error"], axis=1)
+        return path.out_of_reach, recording.off_path()
     for section, unit, error in listed.errors(recording):
         path = getattr(section, "path", None)
         if unit == "m" and path is not None and path.out_of_reach:
@@ -190,9 +186,10 @@ def measure(recording: Recording, settle: float = 2.0,
     settle : [s] after which the start, which may lie off the path, no longer counts.
     cone_tolerance_deg : [deg] beyond the cone that still counts as being on it.
 
-    Distances, joint speeds, limits, cone and listed tasks are judged by the true state where it is
-    known apart from the measured one. A plugin adds metrics with `register("metrics", NAME)` on a
-    function of a recording and Criteria that yields them; if one fails, a warning says so.
+    Position, distances, joint speeds, limits, cone and listed tasks are judged by the true state
+    where it is known apart from the measured one. A plugin adds metrics with
+    `register("metrics", NAME)` on a function of a recording and Criteria that yields them; if one
+    fails, a warning says so.
     """
     if recording.ticks == 0:
         return {}

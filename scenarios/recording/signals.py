@@ -102,7 +102,7 @@ _TABLE = (
     Signal("true_v", "joint/s", "(T, n)", "true velocities, as true_q", _JOINTS),
     Signal("ee_position", "m", "(T, 3)", "the end effector", _END),
     Signal("desired_position", "m", "(T, 3)", "the path of [position]", _END),
-    Signal("position_error", "m", "(T, 3)", "desired minus actual position", _END),
+    Signal("position_error", "m", "(T, 3)", "desired_position minus ee_position", _END),
     Signal("true_ee_position", "m", "(T, 3)", "the end effector at true_q", _END),
     Signal("pointing_error", "", "(T,)", "cos(alpha_d) - cos(alpha), positive outside the cone",
            _END),

@@ -84,7 +84,7 @@ def test_every_claim_names_columns_that_load_on_the_letters_own_robot():
     assert len(blocks.block("asked-letter", blocks.Stored(None, []), str).splitlines()) > 5
 
 
-def test_runs_are_resumed_and_noise_is_small(tmp_path):
+def test_runs_are_resumed_and_noise_is_small(tmp_path, monkeypatch):
     short = {"lwr": {**protocol.PROTOCOL.layouts["lwr"], "control.duration": 0.02}}
     some = replace(protocol.PROTOCOL, layouts=short, seeds=(1,), starts=2,
                    columns={name: protocol.PROTOCOL.columns[name] for name in ("letter", "hqp")})
@@ -93,6 +93,9 @@ def test_runs_are_resumed_and_noise_is_small(tmp_path):
     before = file.stat().st_size
     (second,) = protocol.run(some, tmp_path, Workers(1))
     assert (first, before) == (second, file.stat().st_size)
+    monkeypatch.setattr(protocol, "_MEASURED", "other metrics")
+    assert next(protocol.run(some, tmp_path, Workers(1))) == first
+    assert file.stat().st_size > 1.9 * before
     exact, noisy = (first.column("letter", "speed_max", k) for k in (0, 1))
     assert exact == pytest.approx(noisy, rel=1e-4)
     protocol.write(first, tmp_path / "rows.json")

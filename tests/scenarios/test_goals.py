@@ -227,6 +227,8 @@ def test_tasks_are_judged_by_where_the_robot_truly_is_wherever_a_file_lists_them
     apart = np.abs(runs[0]["true_pointing_error"] - runs[0]["pointing_error"]).max()
     assert 1e-4 < apart < 0.1
     assert goals(runs[0])[:2] == goals(runs[1])[:2]
+    path, task = (measure(run) for run in runs)
+    assert path["position_error_rms"].value == pytest.approx(task["task_position_rms"].value)
 
 
 def test_an_answer_that_the_resolver_does_not_give_is_not_blamed_on_the_rows():

@@ -85,7 +85,7 @@ def test_frozen_returned_and_jerk_are_counted(spans, frozen, returned):
     path = SimpleNamespace(out_of_reach=spans)
     found = measure(recording(
         asked(position=SimpleNamespace(path=path)), t=np.arange(6.0), v=v, a=a,
-        position_error=error[:, None] * [1.0, 0.0, 0.0]))
+        position_error=np.zeros((6, 3)), desired_position=error[:, None] * [1.0, 0.0, 0.0]))
     assert found["ticks_frozen"].value == len(frozen)
     assert found["error_returned_max"].value == (error[returned].max() if returned else None)
     assert found["error_returned_rms"].value == (

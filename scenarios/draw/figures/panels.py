@@ -123,8 +123,7 @@ def pointing_error(ax: Axes, recording: Recording, colour: str) -> None:
 
 def position_error(ax: Axes, recording: Recording, colour: str) -> None:
     """Draw the distance of the end effector from where it should be [mm], logarithmic."""
-    error = 1e3 * np.linalg.norm(recording["position_error"], axis=1)
-    drawing.curve(ax, recording["t"], np.maximum(error, 1e-6), color=colour)
+    drawing.curve(ax, recording["t"], np.maximum(1e3 * recording.off_path(), 1e-6), color=colour)
     drawing.make_logarithmic(ax, "y")
 
 
