@@ -22,47 +22,30 @@ class LeastSquares(Solver):
         return Answer(raw, solved=True, iterations=3)
 
 
-class Crashing(LeastSquares):
-    """Ends its process at the problem whose first side is 2."""
-
-    def at_two(self):
-        os.kill(os.getpid(), signal.SIGKILL)
-
-    def solve(self, prepared):
-        if prepared.lower[0] == 2.0:
-            self.at_two()
-        return super().solve(prepared)
+def breaking(name, begin):
+    """An entrant that does something with a problem before it answers."""
+    return type(name, (LeastSquares,), {"solve": lambda self, prepared: (
+        begin(prepared), LeastSquares.solve(self, prepared))[1]})
 
 
-class Hanging(Crashing):
-    """Never comes back from it."""
-
-    def at_two(self):
-        time.sleep(1000.0)
+def for_ever(prepared):
+    while len(prepared.reference) == 1:
+        pass
 
 
-class Slow(LeastSquares):
-    """Works for ever on a problem of one unknown."""
-
-    def solve(self, prepared):
-        while len(prepared.reference) == 1:
-            pass
-        return super().solve(prepared)
+def raises(prepared):
+    print("noise")  # where rows are expected
+    raise ArithmeticError("not today")
 
 
-class Raising(LeastSquares):
-    """Raises, and prints where rows are expected."""
-
-    def solve(self, prepared):
-        print("noise")
-        raise ArithmeticError("not today")
+def at_two(prepared):
+    return prepared.lower[0] == 2.0
 
 
-class Doomed(LeastSquares):
-    """Ends its process every time."""
-
-    def solve(self, prepared):
-        os._exit(3)
+Crashing = breaking("Crashing", lambda one: at_two(one) and os.kill(os.getpid(), signal.SIGKILL))
+Hanging = breaking("Hanging", lambda one: at_two(one) and time.sleep(1000.0))
+Slow, Raising = breaking("Slow", for_ever), breaking("Raising", raises)
+Doomed = breaking("Doomed", lambda _: os._exit(3))
 
 
 class Moody(LeastSquares):

@@ -10,11 +10,11 @@ from typing import Annotated, Literal
 import numpy as np
 import pytest
 from refusals import refused
-from scene import FRAME, ROBOT, SENSOR, resting, state_at
+from scene import FRAME, ROBOT, SENSOR, of_user, resting, state_at
 from standing import CONTACTS, feet, opening
 from standing import ROBOT as HUMANOID
 
-from hierarchy import Hierarchy, Robot, Stack, State, Task, plugins, tasks
+from hierarchy import Hierarchy, Robot, Stack, State, plugins, tasks
 from hierarchy.activation import Activation, activation
 from hierarchy.avoidance import (
     Barrier,
@@ -55,38 +55,17 @@ ARM, KEPT = ROBOT.capsules, Barrier(0.02)
 TIMES, CORNERS = (0.5, 1.2), ((0.0, 0.0, 0.1), (0.3, 0.1, 0.2))
 
 
-@dataclass(frozen=True)
-class Given(Task):
+def given(wrong=(0.0, 0.0), rate=(0.0, 0.0), J=None, **more):
     """A task of a user that returns what it is given."""
-
-    wrong: object = (0.0, 0.0)
-    rate: object = (0.0, 0.0)
-    J: object = None
-    name: str = "given"
-    dimension = 2
-
-    def error(self, state):
-        return self.wrong
-
-    def desired_velocity(self, state):
-        return self.rate
-
-    def jacobian(self, state):
-        return np.eye(2, state.n) if self.J is None else self.J
-
-    jacobian_derivative = jacobian
+    return of_user("given", 2, lambda _: wrong,
+                   lambda state: np.eye(2, state.n) if J is None else J,
+                   desired_velocity=lambda *_: rate, **more)
 
 
-class Kernel(Measured):
+def kernel(wrong, name="kernel"):
     """The same, of one that is measured."""
-
-    name, dimension = "kernel", 1
-
-    def __init__(self, wrong):
-        self.wrong = wrong
-
-    def measure(self, state):
-        return self.wrong
+    return type("Kernel", (Measured,), {"name": name, "dimension": 1,
+                                        "measure": lambda *_: wrong})()
 
 
 @dataclass(frozen=True)
@@ -246,8 +225,8 @@ def limits(**settings):
     (lambda: SurveillanceAreas(0.2, 0.1, 0.1), "near"),
     (lambda: Barrier(0.1, recovery=NAN), "recovery = nan"),
     (lambda: Barrier(0.1, influence=0.1), "influence = 0.1 m must be more"),
-    *((lambda given=given: ControlPoint("x", *given), f"control point 'x': {said}")
-      for given, said in ((("hand", (0, 0, 0)), "joint = 'hand'"), ((1, (0, 0)), "offset [m]"))),
+    *((lambda place=place: ControlPoint("x", *place), f"control point 'x': {said}")
+      for place, said in ((("hand", (0, 0, 0)), "joint = 'hand'"), ((1, (0, 0)), "offset [m]"))),
     (lambda: tasks.Separation([ControlPoint("x", np.int64(99), (0, 0, 0))], KEPT).rows(STATE),
      "points is on joint 99"),  # of another robot, past the end of its arrays
     (lambda: Capsule("x", 1, (0, 0, 0), (0, 0, 1), -1.0), "capsule 'x': radius [m] = -1"),
@@ -329,8 +308,8 @@ def limits(**settings):
     (lambda: rows_of(tasks.TorqueStep(ROBOT, 1.0), "acceleration"), "level torque, not 'acceler"),
     (lambda: tasks.DangerBounds(tasks.JointLimits(HUMANOID, 5.0, 0.01), HUMANOID.control_points),
      "floating base"),
-    *((lambda given=given: rows_after(given), f"'joint limits': state.commanded = {said}")
-      for given, said in ((np.zeros(6), "ndarray array([0."), ([0.0] * 7, "list [0.0"),
+    *((lambda sent=sent: rows_after(sent), f"'joint limits': state.commanded = {said}")
+      for sent, said in ((np.zeros(6), "ndarray array([0."), ([0.0] * 7, "list [0.0"),
                           (np.full(7, NAN), "ndarray array([nan"))),
     (lambda: rows_after(np.zeros(6), tasks.TorqueStep(HUMANOID, 1.0, contacts=CONTACTS)),
      "'torque step': state.commanded has shape (6,), expected (30,)"),
@@ -346,21 +325,20 @@ def limits(**settings):
     *((lambda task=task: rows_of(HAND, reference=task),
        f"{task.name!r}: the reference of a stack has a row for each joint")
       for task in (HAND, LIMITS)),
-    *((lambda wrong=wrong: Given(wrong).error_reader(STATE)(), f"task 'given': error {said}")
+    *((lambda wrong=wrong: given(wrong).error_reader(STATE)(), f"task 'given': error {said}")
       for wrong, said in ((None, "is not an array of numbers"), ("x", "is not an array of numb"),
                           ([1.0], "has shape (1,), expected (2,)"))),
-    (lambda: Stack([type("Nameless", (Kernel,), {"name": None})(abs)]), "Nameless: name: expected"),
-    *((lambda wrong=wrong: rows_of(Given(**wrong)), said)
+    (lambda: Stack([kernel(abs, None)]), "Kernel: name: expected a str, got NoneType None"),
+    *((lambda wrong=wrong: rows_of(given(**wrong)), said)
       for wrong, said in (({"wrong": [1.0, 2.0, 3.0]}, "'given': error has shape (3,), expec"),
                           ({"wrong": [0.0, NAN]}, "task 'given', row 1: lower is nan"),
                           ({"J": np.eye(7)}, "jacobian has shape (7, 7), expected (2, 7)"),
                           ({"J": NAN * np.eye(2, 7)}, "task 'given', row 0: A[0, 0] is nan"),
                           ({"wrong": "a"}, "'given': error is not an array of numbers"),
                           ({"rate": [0.0]}, "'given': desired_velocity has shape (1,)"))),
-    (lambda: rows_of(type("Plain", (Given,), {"kind": "Equality", "__init__": lambda _: None})()),
-     "task 'given': kind"),
-    *((lambda given=given: Kernel(given).error(STATE), f"'kernel': measure returned {said}")
-      for given, said in ((abs, "builtin"), ((abs, ()), "tuple"), (None, "NoneType"))),
+    (lambda: rows_of(given(kind="Equality")), "task 'given': kind"),
+    *((lambda wrong=wrong: kernel(wrong).error(STATE), f"'kernel': measure returned {said}")
+      for wrong, said in ((abs, "builtin"), ((abs, ()), "tuple"), (None, "NoneType"))),
     (lambda: Activation(None, (), {"wall": 0.0}), "task 'wall': buffer = 0: expected"),
     (lambda: check_rotation("R", np.diag([1.0, 1.0, -1.0])), "a reflection, of determinant -1"),
     *((lambda off=off: check_rotation("R", np.eye(3) + off * np.eye(3, k=1)),
@@ -437,13 +415,13 @@ def test_what_would_be_said_of_a_wrong_measure_is_not_written_for_a_right_one(mo
     assert HAND.jacobian(STATE).shape == (3, 7)
 
 
-@pytest.mark.parametrize("given", ["state", None, 3, ROBOT])
-@pytest.mark.parametrize("task", [HAND, tasks.Posture((0.0,) * 7), Given()],
+@pytest.mark.parametrize("wrong", ["state", None, 3, ROBOT])
+@pytest.mark.parametrize("task", [HAND, tasks.Posture((0.0,) * 7), given()],
                          ids=lambda task: task.name)
-def test_what_takes_a_state_refuses_anything_else(task, given):
+def test_what_takes_a_state_refuses_anything_else(task, wrong):
     for method in (task.error, task.jacobian, task.jacobian_derivative, task.reference_velocity,
                    task.reference_acceleration):
-        refused(f"task '{task.name}': state: expected a State", method, given)
+        refused(f"task '{task.name}': state: expected a State", method, wrong)
 
 
 def test_of_many_names_the_first_are_told_and_never_that_there_is_one_more():

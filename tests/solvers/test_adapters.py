@@ -1,5 +1,6 @@
 """Adapters against the packages that they are for."""
 
+import inspect
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -9,6 +10,7 @@ import pytest
 import qpsolvers
 from refusals import refused
 
+from benchmark.studies.pink_examples import exact, least_squares
 from hierarchy import Hierarchy, Robot, Stack, State
 from solvers import make
 from solvers.adapters import drop_in
@@ -16,6 +18,11 @@ from solvers.adapters.for_pink import solve_ik
 from solvers.adapters.from_pink import PinkTask
 from solvers.adapters.from_pink import hierarchy as pink_hierarchy
 from solvers.qp.programs import level_problem
+
+try:
+    import pink
+except ImportError:  # its tests are skipped
+    pink = None
 
 DT = 0.01
 Q = np.array([0.1, 0.5, -0.2, -1.0, 0.3, 0.8, 0.0])
@@ -32,16 +39,16 @@ def robot():
 
 @pytest.fixture
 def configuration(robot):
-    import pink
+    return configured(robot.model, Q)
 
-    return pink.Configuration(robot.model, robot.model.createData(), Q)
+
+def configured(model, q):
+    return pink.Configuration(model, model.createData(), q)
 
 
 def frame_task(configuration, frame="end_effector", shift=(0.05, 0.02, -0.03), turn=0.1, gain=0.5,
                position=1.0, orientation=0.5):
-    from pink.tasks import FrameTask
-
-    task = FrameTask(frame, position_cost=position, orientation_cost=orientation, gain=gain)
+    task = pink.tasks.FrameTask(frame, position, orientation, gain=gain)
     here = configuration.get_transform_frame_to_world(frame)
     task.set_target(pin.SE3(here.rotation @ pin.exp3(np.array([turn, 0.0, 0.0])),
                             here.translation + np.array(shift)))
@@ -49,9 +56,7 @@ def frame_task(configuration, frame="end_effector", shift=(0.05, 0.02, -0.03), t
 
 
 def posture_task(target, cost=0.1):
-    from pink.tasks import PostureTask
-
-    task = PostureTask(cost=cost)
+    task = pink.tasks.PostureTask(cost=cost)
     task.set_target(np.asarray(target))
     return task
 
@@ -63,9 +68,7 @@ def arm_scene(configuration, lm_damping=0.0, cost=1e-3, **arguments):
 
 
 def wall(configuration, room, gain, safe):
-    from pink.barriers import PositionBarrier
-
-    class Backing(PositionBarrier):
+    class Backing(pink.barriers.PositionBarrier):
         def compute_safe_displacement(self, configuration):
             return np.linspace(-0.01, 0.01, 7)
 
@@ -87,14 +90,11 @@ def still():
 
 
 def humanoid_scene(_):
-    import pink
-    from pink.tasks import ComTask
-
     robot = Robot.named("humanoid")
-    configuration = pink.Configuration(robot.model, robot.model.createData(), robot.rest)
+    configuration = configured(robot.model, robot.rest)
     feet = [frame_task(configuration, foot, (0.0, 0.0, 0.0), 0.0, 1.0, 200.0, 1.0)
             for foot in ("left_foot", "right_foot")]
-    com = ComTask(cost=1.0, lm_damping=1.0)
+    com = pink.tasks.ComTask(cost=1.0, lm_damping=1.0)
     com.set_target(pin.centerOfMass(robot.model, robot.model.createData(), robot.rest)
                    + np.array([0.03, 0.0, -0.05]))
     return configuration, [*feet, com, posture_task(robot.rest, cost=1e-2)], {}
@@ -113,18 +113,17 @@ SCENES = {
     "humanoid": humanoid_scene}
 
 
+@pytest.mark.usefixtures("robot")
 @pytest.mark.parametrize(("lm_damping", "turned"), [(0.0, 0.0), (1e-6, 0.5)])
 def test_light_damping_leaves_every_answer_verified(lm_damping, turned):
     """Beside the rows of the tasks, rounding hid those of the damping: one answer in five."""
-    import pink
-
     robot, frames = Robot.named("humanoid"), ("left_hand", "right_hand", "left_foot")
     for seed in range(20):
         rng = np.random.default_rng(seed)
         q = pin.integrate(robot.model, robot.rest, 0.2 * rng.normal(size=robot.model.nv))
         low, high = robot.model.lowerPositionLimit, robot.model.upperPositionLimit
         q[7:] = np.clip(q[7:], low[7:], high[7:])
-        there = pink.Configuration(robot.model, robot.model.createData(), q)
+        there = configured(robot.model, q)
         tasks = [frame_task(there, frame, 0.1 * rng.normal(size=3), gain=1.0, orientation=turned)
                  for frame in frames]
         for task in tasks:
@@ -134,14 +133,10 @@ def test_light_damping_leaves_every_answer_verified(lm_damping, turned):
 
 
 @pytest.mark.parametrize("seed", [1, 5, 13])
-def test_a_damped_task_out_of_reach_above_others_never_leaves_a_tick_without_an_answer(seed):
+def test_a_damped_task_out_of_reach_above_others_never_leaves_a_tick_without_an_answer(robot, seed):
     """Its nearly singular rows were to keep their values beside limits that act: it stopped."""
-    import pink
-
-    robot, rng = Robot.named("kuka_lwr"), np.random.default_rng(seed)
-    low, high = robot.model.lowerPositionLimit, robot.model.upperPositionLimit
-    there = pink.Configuration(robot.model, robot.model.createData(),
-                               np.clip(robot.rest + 0.1 * rng.normal(size=7), low, high))
+    rng, low, high = np.random.default_rng(seed), robot.lower, robot.upper
+    there = configured(robot.model, np.clip(robot.rest + 0.1 * rng.normal(size=7), low, high))
     hand = frame_task(there, shift=0.3 * rng.normal(size=3), turn=0.0, orientation=1.0)
     hand.lm_damping = 1e-6
     posture = posture_task(robot.rest, 1e-3)
@@ -155,10 +150,6 @@ def test_a_damped_task_out_of_reach_above_others_never_leaves_a_tick_without_an_
 
 @pytest.mark.parametrize("scene", SCENES)
 def test_one_level_is_the_exact_minimum_of_pinks_cost_under_its_limits(configuration, scene):
-    import pink
-
-    from benchmark.studies.pink_examples import exact, least_squares
-
     configuration, tasks, arguments = SCENES[scene](configuration)
     ours = solve_ik(configuration, [tasks], DT, **arguments)
     problem = pink.build_ik(configuration, tasks, DT, **arguments)
@@ -182,28 +173,24 @@ def limit(*rows):
 
 
 def test_limits_that_contradict_each_other_are_no_solution_and_named(configuration):
-    from pink.exceptions import NoSolutionFound
-    from pink.limits import VelocityLimit
-
-    slow, hand = VelocityLimit(configuration.model, np.full(7, 0.01)), [frame_task(configuration)]
-    with pytest.raises(NoSolutionFound, match=r"joint joint_3 must move by at least 100 "
-                       r"\(SimpleNamespace\) and at most 0.01 rad/s or m/s \(VelocityLimit\)"):
-        solve_ik(configuration, hand, DT, limits=[slow, limit((0, 1.0, 3.0), (2, -1.0, -1.0))])
+    slow, hand = pink.limits.VelocityLimit(configuration.model, np.full(7, 0.01)), [
+        frame_task(configuration)]
     sums = SimpleNamespace(compute_qp_inequalities=lambda *_: (-np.ones((1, 7)), [-0.01]))
-    with pytest.raises(NoSolutionFound, match=r"limits cannot all hold; at best these are violated:"
-                       r" SimpleNamespace, row 0 by .*joint_1 by"):
-        solve_ik(configuration, hand, DT, limits=[slow, sums])
-    with pytest.raises(NoSolutionFound, match=r"the constraints do not hold with weighted.*, which "
-                       "is not strict; these are violated: .* by"):
-        solve_ik(configuration, [posture_task(Q + 0.1)], DT, "weighted", constraints=hand)
+    for tasks, settings, said in (
+            (hand, {"limits": [slow, limit((0, 1.0, 3.0), (2, -1.0, -1.0))]}, r"joint joint_3 must "
+             r"move by at least 100 \(SimpleNamespace\) and at most 0.01 rad/s or m/s \(Velocity"),
+            (hand, {"limits": [slow, sums]}, "limits cannot all hold; at best these are violated: "
+             "SimpleNamespace, row 0 by .*joint_1 by"),
+            ([posture_task(Q + 0.1)], {"solver": "weighted", "constraints": hand}, "constraints do "
+             "not hold with weighted.*, which is not strict; these are violated: .* by")):
+        with pytest.raises(pink.exceptions.NoSolutionFound, match=said):
+            solve_ik(configuration, tasks, DT, **settings)
 
 
 def test_rounding_in_a_limit_or_a_level_changes_nothing(configuration):
     """The one froze the torso below a barrier for a frame on its axis; with the other, of two
     frames that no joint moves apart, no answer was verified."""
-    from pink.tasks import RelativeFrameTask
-
-    fixed = RelativeFrameTask("end_effector", "joint_7", 1.0, 1.0)
+    fixed = pink.tasks.RelativeFrameTask("end_effector", "joint_7", 1.0, 1.0)
     fixed.set_target(pin.SE3.Random())
     assert 0.0 < np.abs(fixed.compute_jacobian(configuration)).max() < 1e-12
     hand, bound = [frame_task(configuration)], limit((0, 70.0, 0.6))
@@ -216,10 +203,6 @@ def test_rounding_in_a_limit_or_a_level_changes_nothing(configuration):
 
 
 def test_pinks_arguments_are_taken_in_pinks_order(configuration):
-    import inspect
-
-    import pink
-
     ours, theirs = ([(one.name, one.name == "solver" or one.default)
                      for one in inspect.signature(solve).parameters.values()
                      if one.kind is one.POSITIONAL_OR_KEYWORD]
@@ -253,11 +236,9 @@ def test_a_solver_of_qpsolvers_is_answered_by_hcod_with_a_note(configuration):
 
 
 def renamed(robot):
-    import pink
-
     model = robot.model.copy()
     model.names[1] = "other"
-    return pink.Configuration(model, model.createData(), Q)
+    return configured(model, Q)
 
 
 def rows_at(robot, configuration, level):

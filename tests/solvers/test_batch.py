@@ -4,7 +4,7 @@ import os
 
 import numpy as np
 import pytest
-from rank_cases import boxed, family, moved, rng
+from rank_cases import boxed, family, gap, moved, rng
 from refusals import refused
 
 from hierarchy import Hierarchy
@@ -92,7 +92,6 @@ def arrays(**wrong):
     (lambda: arrays(A=1j * np.ones((4, 3, 5))), "A is not an array of real"),
     (lambda: arrays(lower=np.ones((4, 2))), "lower has shape (4, 2), expected (4, 3)"),
     (lambda: arrays(upper="high"), "upper"), (lambda: arrays(reference=np.ones((5, 4))), "refer"),
-    (lambda: arrays(sizes=[2, 2]), "sizes sum to 4"), (lambda: arrays(sizes=[1.5, 1.5]), "whole"),
     (lambda: Batch.of([Hierarchy.from_levels([(np.eye(3)[:k], np.ones(k))]) for k in (2, 1)]),
      "problem 1"), (lambda: Batch.of([]), "no hierarchies"),
     (lambda: Batch.of(None), "Batch.of: hierarchies: expected an Iterable, got NoneType None"),
@@ -118,11 +117,6 @@ def test_a_batch_may_be_empty_or_without_rows(name, shape):
     assert m or (answer.x == 1.0).all()
 
 
-def assert_near(x, expected):
-    error = np.linalg.norm(x - expected, axis=1) / (1.0 + np.linalg.norm(expected, axis=1))
-    assert error.max() < 1e-9
-
-
 def test_jax_agrees_with_the_kernel_fails_alone_and_refuses():
     pytest.importorskip("jax")
     from solvers.batch import on_jax
@@ -131,13 +125,13 @@ def test_jax_agrees_with_the_kernel_fails_alone_and_refuses():
         batch, resolver = Batch.of(problems_of(of)), make("tpm", damping=damping)
         ours, theirs = solve(batch, resolver), on_jax.solve(batch, resolver)
         np.testing.assert_array_equal(ours.status, theirs.status)
-        assert_near(theirs.x, ours.x)
+        assert max(map(gap, theirs.x, ours.x)) < 1e-9
     batch = Batch.of(problems_of("EQ7", copies=1))
     batch.A[3, 0, 0], batch.lower[5, 0] = np.nan, np.inf
     answer = on_jax.solve(batch)
     assert np.flatnonzero(~answer.solved).tolist() == [3, 5]
     assert not answer.x[[3, 5]].any()
-    assert_near(answer.x, solve(batch).x)
+    assert max(map(gap, answer.x, solve(batch).x)) < 1e-9
     batch.upper[11, 4] += 1.0
     refused("problem 11, level 3, row 0: an inequality", on_jax.solve, batch)
     refused("hcod is not available in jax", lambda: on_jax.solve(batch, make("hcod")))

@@ -13,7 +13,7 @@ from standing import ROBOT as HUMANOID
 from standing import WEIGHT, feet, standing_stack
 from urdf_text import LIMIT, joint, link, loaded, placed
 
-from hierarchy import Hierarchy, Robot, State, Task
+from hierarchy import Hierarchy, Robot, State
 from hierarchy.avoidance import Barrier
 from hierarchy.paths import Still, circle
 from hierarchy.tasks import (
@@ -74,30 +74,24 @@ def test_what_a_call_has_set_up_serves_the_same_objects_and_changes_no_answer(ch
         memory, q = step.memory, ROBOT.integrate(q, step.v * 0.01)
 
 
-class Changing(Task):
-    """A position of a user who asks within it, or takes other rows, while its set-up is kept."""
-
-    name, dimension, gain, again = "changing", 3, 2.0, None
-
-    def error(self, state):
-        if self.again and state.q[0] == Q[0]:
-            self.again(Q + 0.1)
-        return (np.array([0.3, 0.5, 0.1]) - state.position(FRAME))[:self.dimension]
-
-    def jacobian(self, state):
-        return resting([0.3, 0.5, 0.1]).jacobian(state)[:self.dimension]
-
-    jacobian_derivative = jacobian
-
-
 def test_what_is_kept_serves_one_call_at_a_time_and_tasks_of_its_size():
-    changing = Changing()
+    """A user's task asks within it, or takes other rows, while its set-up is kept."""
+    there, again = resting([0.3, 0.5, 0.1]), []
+
+    def error(state):
+        if again and state.q[0] == Q[0]:
+            again[0](Q + 0.1)
+        return there.error(state)[:changing.dimension]
+
+    changing = of_user("changing", 3, error, lambda state: there.jacobian(state)[
+        :changing.dimension], gain=2.0)
     tasks = [changing, Posture(tuple(Q + 0.05))]
     ask = partial(solve_ik, ROBOT, tasks=tasks)
     plain = [ask(Q).v for _ in range(2)][-1]
-    changing.again = ask
+    again.append(ask)
     np.testing.assert_array_equal(ask(Q).v, plain)
-    changing.again, changing.dimension = None, 2
+    again.clear()
+    changing.dimension = 2
     np.testing.assert_allclose(changing.jacobian(AT) @ ask(Q).v, 2.0 * changing.error(AT))
     aims = (list(Q), np.asfortranarray(AT.rotation(FRAME)), np.array([1.0, 2.0, 3.0]),
             np.eye(3)[:1].copy(), np.array([0.3, 0.0, 0.0]))
