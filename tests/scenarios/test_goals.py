@@ -69,14 +69,6 @@ def test_a_goal_has_a_flag_and_its_worst_distance(signals, name, flag, worst, un
     assert (one.flag, one.worst, one.unit) == (flag, pytest.approx(worst), unit)
 
 
-def test_limits_of_joints_that_turn_and_of_those_that_slide_are_two_goals():
-    run = recording(**joint([0.0, 2.5, 0.0, 0.0, 0.0]))
-    robot = replace(run.facts.robot, position_units=("rad",) * 6 + ("m",))
-    mixed = replace(run, facts=replace(run.facts, robot=robot))
-    found = {one.title: one.flag for one in goals(mixed) if one.name == "joint limits"}
-    assert found == {"joint limits, in rad": "broken", "joint limits, in m": "kept"}
-
-
 def test_goals_of_one_name_in_two_units_are_not_weighed_against_each_other():
     hand = Goal("hand", "", "m", False, 1e-3, 0.02, 0.02, 0.5, 0.0, 0.0)
     off = lines([Verdict(unit, 1.0, 1.0, None, False, (replace(hand, unit=unit),))
@@ -118,17 +110,6 @@ def test_pairs_are_counted_by_their_direction_and_too_few_tell_nothing():
     many = np.r_[np.full(26, -1.0), np.full(24, 2.0)]  # more are lower, but by less
     assert paired(np.zeros(50), many).p < 0.01
     assert str(paired(np.zeros(50), many)) == "not distinguishable"
-
-
-RISING = np.arange(1.0, 17.0)
-
-
-@pytest.mark.parametrize(("shift", "said"), [
-    (0.1 + 0.01 * np.random.default_rng(0).random(16), "lower in 16 of 16, p < 0.001"),
-    (np.where(RISING <= 7.0, 0.5, 0.0), "lower in 7 of 16, the same in 9, p = 0.016")])
-def test_a_shift_of_pairs_is_told_beside_those_that_do_not_differ(shift, said):
-    found = paired(RISING, RISING - shift)
-    assert (found.distinguishable, str(found)) == (True, said)
 
 
 LOW, NORMAL = np.linspace(1.0, 1.5, 16), np.random.default_rng(2).normal(size=(2, 16))

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from hand_made import asked, recording
 
-from scenarios import load, simulate
+from scenarios import load
 from scenarios.measure.metrics import Metric, as_plain_data, measure
 from scenarios.recording import listed
 
@@ -46,17 +46,6 @@ def test_a_number_that_is_not_finite_is_left_out_of_the_file_and_not_passed_off_
     data = as_plain_data(recording(a=np.full((5, 2), np.nan), fault="diverged at tick 5"))
     assert data["metrics"]["acceleration_max"]["value"] is None
     assert (data["fault"], data["ticks"]) == ("diverged at tick 5", 5)
-
-
-def test_a_floating_base_is_no_joint():
-    run = simulate(load("humanoid", ["control.duration=0.05"]))
-    slow = measure(run)
-    for name in ("v", "a", "command"):
-        run.signals[name][1, :6] = 99.0
-    fast = measure(run)
-    for name in ("speed_max", "velocity_step_max", "command_step_max", "acceleration_max",
-                 "acceleration_step_ticks"):
-        assert fast[name].value == slow[name].value
 
 
 def test_distances_are_judged_by_the_true_ones_where_a_sensor_measured_others():
