@@ -14,7 +14,7 @@ from scenarios import load, simulate
 from scenarios.cell.build import build
 from scenarios.loop.controller import Controller
 from scenarios.measure.metrics import measure
-from solvers import certify, make
+from solvers import make
 
 
 @pytest.mark.parametrize("level", ["velocity", "acceleration"])
@@ -54,20 +54,6 @@ def test_any_start_is_recovered_from_within_the_limit_of_acceleration(name, reso
     excess = np.maximum(np.abs(run["v"]) / ROBOT.velocity_limit - 1.0, 0.0)
     assert (np.diff(excess, axis=0) < 1e-9).all()
     assert excess[-1].max() == 0.0
-
-
-def test_every_command_is_certified_in_the_inertia_of_its_tick():
-    """In it bounds are for resolvers of any rows."""
-    controller = Controller(load("ellipse-mass"))
-    cell = controller.cell
-    for tick in range(10):
-        x = controller.command(1e-3 * tick, cell.plant.q, cell.plant.v)
-        np.testing.assert_array_equal(controller.hierarchy.metric, cell.state.mass_matrix())
-        assert certify(controller.hierarchy, x).certified
-        cell.plant.act(x)
-    assert load("ellipse-limits").asks == "bounds"
-    assert load("ellipse-limits", ["control.metric=mass"]).asks == "inequalities"
-    assert load("ellipse", ["control.metric=mass"]).asks == "equalities"
 
 
 def test_all_levels_above_the_posture_are_met_and_their_errors_recorded():
