@@ -15,7 +15,6 @@ from scenarios.config import Scenario, load, shipped
 from scenarios.config.distributions import flat
 from scenarios.config.reference import keys_of, sections
 from scenarios.config.resolvers import default_resolvers
-from scenarios.config.sampling import drawn
 from scenarios.config.validation import _table
 from scenarios.measure.motions import motions, partings
 from scenarios.measure.runs import Run
@@ -107,14 +106,6 @@ def test_a_bad_group_is_an_error_that_names_it(text, says, tmp_path, monkeypatch
     (tmp_path / "mine.toml").write_text(text)
     with pytest.raises(HierarchyError, match=says):
         compare("mine")
-
-
-def test_a_joint_whose_name_has_a_dot_is_changed_and_varied_by_its_name():
-    own = load("ellipse", {"start.joints": {"hinge.001": 0.1, "hinge": 0.2},
-                           "variation": {"start.joints.hinge.001": {"around": 0.05}}})
-    changed = own.with_changes({"start.joints.hinge.001": 0.3})
-    assert changed.start.joints == {"hinge.001": 0.3, "hinge": 0.2}
-    assert abs(drawn(own, own.variation, 0, 0)["start.joints.hinge.001"] - 0.1) <= 0.05
 
 
 # Where strict resolvers part: the tick, and what was different before it.
