@@ -259,6 +259,17 @@ def test_a_number_that_is_not_finite_is_left_out_of_the_file_and_not_passed_off_
     assert (data["fault"], data["ticks"]) == ("diverged at tick 5", 5)
 
 
+def test_a_floating_base_is_no_joint():
+    run = simulate(load("humanoid", ["control.duration=0.05"]))
+    slow = measure(run)
+    for name in ("v", "a", "command"):
+        run.signals[name][1, :6] = 99.0
+    fast = measure(run)
+    for name in ("speed_max", "velocity_step_max", "command_step_max", "acceleration_max",
+                 "acceleration_step_ticks"):
+        assert fast[name].value == slow[name].value
+
+
 def test_distances_are_judged_by_the_true_ones_where_a_sensor_measured_others():
     far = load("ellipse-hqp", {"avoidance.distance": 0.2, "avoidance.influence": 0.3})
     found = measure(recording(

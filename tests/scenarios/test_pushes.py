@@ -54,6 +54,15 @@ def test_tasks_of_joints_have_their_unit_and_none_where_those_differ(units, all_
     assert {section.title: unit for section, unit, _ in errors(run)} == expected
 
 
+def test_a_cone_and_a_direction_have_no_unit():
+    """Their levels were said to be missed by so many m/s²."""
+    tasks = [{"kind": "look-at", "frame": "tool", "target": [1.0, 0.0, 0.0]},
+             {"kind": "pointing", "frame": "tool", "axis": [0.0, 0.0, 1.0], "alpha_d": 20.0}]
+    scenario = load("ellipse-hqp", {"tasks": tasks, "pointing": None})
+    names = ["look-at", "pointing", "position"]
+    assert row_units(scenario, names, {}) == ("", "", "m/s²")
+
+
 def test_a_wrench_has_no_unit():
     for target, unit in (([20.0], "N"), ([20.0] * 3, "N"), ([20.0] * 6, "")):
         scenario = load("wipe", {"tasks.0.target": target})

@@ -47,6 +47,12 @@ def test_what_was_saved_is_loaded_again_to_the_last_bit(tmp_path):
     assert {"python", "pin", "task-hierarchy"} <= versions.keys()
 
 
+def test_a_recording_without_ticks_is_drawn_empty():
+    panels = recording(t=[]).plot().axes
+    assert [len(ax.lines) for ax in panels] == [7, 7, 3, 1]
+    assert not any(line.get_xdata().size for ax in panels for line in ax.lines)
+
+
 @pytest.mark.parametrize(("value", "kept"), [
     (1.5, 1.5), (None, None), ((1, 2.0), (1, 2.0)), (np.inf, "inf"), ((1.0, np.inf), "(1.0, inf)"),
     ([1.0], "[1.0]")])

@@ -188,6 +188,16 @@ def test_an_obstacle_is_drawn_as_far_as_distances_say_that_it_reaches(obstacle):
         assert (balls @ u).max() + radius == pytest.approx(far - seen.distance[0], abs=1e-5)
 
 
+def test_a_joint_has_one_colour_in_a_figure_of_two_runs():
+    run = simulate(load("humanoid-reach", {"control.duration": 0.01}))
+    other = dataclasses.replace(run, signals={**run.signals, "v": np.roll(run["v"], 9, axis=1)})
+    fig = letter.stacked([(one, [letter.PANEL["joint-velocities"]]) for one in (run, other)], "")
+    first, second = ({line.get_label(): line.get_color() for line in ax.lines
+                      if line.get_color() in drawing.JOINTS} for ax in fig.axes)
+    assert first == second
+    assert len(first) == 8
+
+
 @pytest.mark.parametrize("name", ["_{}", r"${}\q$"])
 def test_a_joint_is_in_the_legend_whatever_its_name(name):
     """matplotlib leaves labels with an underscore out of its own, and reads others as formulas."""

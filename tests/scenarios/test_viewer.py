@@ -165,6 +165,10 @@ def test_in_a_browser_the_resolver_is_switched_and_an_obstacle_dragged_in_mid_mo
         assert browser.complaints == []
 
 
+def test_a_run_that_is_over_does_not_play():
+    assert not LivePage(Live(load("ellipse", ["control.duration=0.001"]))).data()["playing"]
+
+
 @pytest.mark.parametrize(("frames", "folder", "ticks", "code"), [
     (0, "run", 1, 1), (1, "run", 10, 0), (1, "file/run", 10, 1)])
 def test_the_command_of_a_live_run_ends_with_1_where_it_did_not_end_or_is_saved_elsewhere(
