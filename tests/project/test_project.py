@@ -102,6 +102,14 @@ def test_what_a_package_says_it_exports_is_there(package):
                                               is getattr(module, name) for name in module.__all__)
 
 
+def failed(code, folder):
+    """What a program complains of, by lines, that finds the modules of a folder before ours."""
+    done = subprocess.run([sys.executable, "-c", code], text=True, capture_output=True, cwd=folder,
+                          check=False, env={**os.environ, "PYTHONPATH": f"{folder}:{ROOT}"})
+    assert done.returncode == 1
+    return done.stderr.splitlines()
+
+
 @pytest.mark.parametrize("name", ["hierarchy", "solvers", "scenarios"])
 def test_a_package_of_the_same_name_is_named_in_one_line(name, tmp_path):
     (tmp_path / name).mkdir()
@@ -110,31 +118,24 @@ def test_a_package_of_the_same_name_is_named_in_one_line(name, tmp_path):
     message = f"the package {name!r} is {file}, not task-hierarchy's"
     command = "import sys; sys.argv = ['bin/hierarchy', 'doctor']; "
     for before, said in ("", f"ImportError: {message}"), (command, f"hierarchy: error: {message}"):
-        done = subprocess.run([sys.executable, "-c", f"{before}from task_hierarchy import main"],
-                              env={**os.environ, "PYTHONPATH": f"{tmp_path}{os.pathsep}{ROOT}"},
-                              text=True, capture_output=True, check=False, cwd=tmp_path)
-        assert done.returncode == 1
-        assert done.stderr.splitlines()[-1].startswith(said)
-    assert len(done.stderr.splitlines()) == 1
+        complaint = failed(f"{before}from task_hierarchy import main", tmp_path)
+        assert complaint[-1].startswith(said)
+    assert len(complaint) == 1
 
 
 def test_an_older_pinocchio_that_comes_first_is_named_in_one_line(tmp_path):
     (tmp_path / "pinocchio.py").write_text("__version__ = '3.9.0'\n")
-    done = subprocess.run([sys.executable, "-c", "from hierarchy import Robot"], text=True,
-                          env={**os.environ, "PYTHONPATH": f"{tmp_path}{os.pathsep}{ROOT}"},
-                          capture_output=True, check=False, cwd=tmp_path)
-    assert f"pinocchio 3.9.0 in {tmp_path / 'pinocchio.py'} is older" in done.stderr
+    assert f"pinocchio 3.9.0 in {tmp_path / 'pinocchio.py'} is older" in failed(
+        "from hierarchy import Robot", tmp_path)[-1]
 
 
 @pytest.mark.parametrize(("name", "size", "without"), [
     ("Robot", "robots", ["pinocchio", "coal"]), ("simulate", "scenarios", ["pydantic"]),
     ("simulate", "scenarios", ["pinocchio", "coal"])])
 def test_a_name_of_a_larger_size_says_the_line_that_installs_it(name, size, without, tmp_path):
-    code = (f"import sys; sys.modules |= dict.fromkeys({without})\n"
-            f"import task_hierarchy; task_hierarchy.{name}")
-    done = subprocess.run([sys.executable, "-c", code], text=True, capture_output=True, check=False,
-                          cwd=tmp_path)
-    assert f"pip install 'task-hierarchy[{size}]'" in done.stderr.splitlines()[-1]
+    assert f"pip install 'task-hierarchy[{size}]'" in failed(
+        f"import sys; sys.modules |= dict.fromkeys({without})\n"
+        f"import task_hierarchy; task_hierarchy.{name}", tmp_path)[-1]
 
 
 @pytest.mark.parametrize("package", ["hierarchy", "solvers", "scenarios"])

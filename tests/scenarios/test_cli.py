@@ -13,7 +13,7 @@ from hand_made import recording
 
 from scenarios import compare, load, load_run, simulate
 from scenarios.cli import doctor, terminal
-from scenarios.cli.main import _with_its_file, app
+from scenarios.cli.main import app
 from scenarios.files import OutputError, claim, in_runs, slug
 from scenarios.measure import run_folder
 from scenarios.measure.runs import Cell, Row
@@ -186,13 +186,6 @@ def test_a_folder_that_cannot_be_made_is_said_before_the_run(name, tmp_path):
 def test_an_unknown_user_in_a_path_is_the_name_of_a_folder(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     assert claim("~nobody of this name/a") == tmp_path / "~nobody of this name" / "a"
-
-
-@pytest.mark.parametrize(("text", "files", "said"), [
-    ("no such task", ["own.toml"], "own.toml: no such task"), ("no such task", ["a.toml", "b.toml"],
-     "no such task"), ("own.toml: key", ["own.toml"], "own.toml: key")])
-def test_an_error_names_the_one_file_of_a_command_once(text, files, said):
-    assert _with_its_file(text, ["run", *files]) == said
 
 
 def test_names_of_settings_that_differ_late_give_different_folders():

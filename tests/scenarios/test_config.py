@@ -7,7 +7,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 from hand_made import asked, recording
-from refusals import refused
 
 import scenarios.config.reading as groups_of
 from hierarchy import HierarchyError
@@ -16,8 +15,7 @@ from scenarios.config import Scenario, load, shipped
 from scenarios.config.distributions import flat
 from scenarios.config.reference import keys_of, sections
 from scenarios.config.resolvers import default_resolvers
-from scenarios.config.sampling import drawn
-from scenarios.config.validation import _table, tag_at
+from scenarios.config.validation import _table
 from scenarios.measure.motions import motions, partings
 from scenarios.measure.runs import Run
 from scenarios.results.plan import load_sweep
@@ -32,32 +30,6 @@ def test_every_shipped_scenario_loads_under_its_own_name_and_reads_back_the_same
     scenario.make_resolver()
     (tmp_path / "scenario.toml").write_text(scenario.to_toml())
     assert load(tmp_path / "scenario.toml") == scenario == Scenario(**dict(scenario))
-
-
-def test_a_variant_has_two_names_and_those_of_a_file_extend_it(tmp_path):
-    assert load("ellipse:35deg") == load("ellipse-35deg")
-    (tmp_path / "mine.toml").write_text('extends = "ellipse:limits"\nname = "mine"\n'
-                                        "[variants.wide.pointing]\nalpha_d = 50.0\n")
-    assert load(f"{tmp_path}/mine.toml").pointing.alpha_d == 5.0
-    wide = load(f"{tmp_path}/mine.toml:wide")
-    assert (wide.name, wide.pointing.alpha_d) == ("mine-wide", 50.0)
-    assert wide.limits == load("ellipse-limits").limits
-    refused("wide", load, f"{tmp_path}/mine.toml:wid")
-
-
-def test_what_varies_of_a_section_of_another_kind_is_what_the_file_itself_says(tmp_path):
-    """The keys of its own [variation] were dropped with those of the kind that it replaces."""
-    file, own = tmp_path / "mine.toml", "[variation]\navoidance.distance = {uniform = [0.02, 0.03]}"
-    text = ('extends = "ellipse"\nname = "mine"\ncontrol.stack = "hierarchical"\n'
-            '[avoidance]\nkind = "separation"\nobstacles = [[0.3, 0.6, 0.3]]\n')
-    for given, kept in ((text, []), (text + own, ["avoidance.distance"])):
-        file.write_text(given)
-        assert [key for key in load(file).variation if key.startswith("avoidance")] == kept
-    file.write_text('extends = "ellipse"\nname = "mine"\nreplaces = ["avoidance"]\n')
-    assert list(load(file).variation) == ["start.q"]  # nothing could be drawn for the other key
-    assert list(load("ellipse", {"avoidance": None}).variation) == ["start.q"]
-    frames = {"sensor": {"kind": "frames", "folder": "hand"}}
-    assert set(load("human").variation) - set(load("human", frames).variation) == {"sensor.seed"}
 
 
 def test_a_file_is_beside_the_one_that_names_it_or_in_the_working_directory_of_a_change(
@@ -86,24 +58,6 @@ def test_a_file_is_beside_the_one_that_names_it_or_in_the_working_directory_of_a
         assert keys["robot.model"].choice == (f"{tmp_path}/a.urdf", "kuka_lwr")
         assert keys["a.path.file"].choice == (f"{tmp_path}/b",)
     assert found.with_changes({"robot.model": "c.urdf"}).robot.model == f"{tmp_path}/base/c.urdf"
-
-
-def test_a_resolver_is_swapped_by_name_keeping_the_shared_settings():
-    s = load("ellipse").with_resolver("recursive")
-    assert s.control.resolver == "recursive"
-    assert s.control.settings() == {"damping": 0.05, "threshold": 0.1}
-    assert load("ellipse", ["control.resolver=recursive"]) == s, "changing its name is enough"
-    assert s.with_resolver("tpm-published") == load("ellipse")
-    assert load("ellipse").with_resolver("tpm:damping=0.01").control.settings() == {
-        "damping": 0.01, "threshold": 0.1}
-
-
-@pytest.mark.parametrize(("section", "tag"), [
-    ("tasks.0", ("kind", None)), ("position.path", ("kind", None)),
-    ("plant", ("kind", "kinematic")), ("avoidance.obstacles.1", ("shape", "point")),
-    ("robot", None), ("faults.0", None)])
-def test_the_key_that_says_the_kind_of_a_section_may_have_a_default(section, tag):
-    assert tag_at(Scenario, section.split(".")) == tag
 
 
 def test_tables_are_read_at_a_path_and_flattened_and_what_is_none_is_empty_or_stays():
@@ -154,14 +108,6 @@ def test_a_bad_group_is_an_error_that_names_it(text, says, tmp_path, monkeypatch
         compare("mine")
 
 
-def test_a_joint_whose_name_has_a_dot_is_changed_and_varied_by_its_name():
-    own = load("ellipse", {"start.joints": {"hinge.001": 0.1, "hinge": 0.2},
-                           "variation": {"start.joints.hinge.001": {"around": 0.05}}})
-    changed = own.with_changes({"start.joints.hinge.001": 0.3})
-    assert changed.start.joints == {"hinge.001": 0.3, "hinge": 0.2}
-    assert abs(drawn(own, own.variation, 0, 0)["start.joints.hinge.001"] - 0.1) <= 0.05
-
-
 # Where strict resolvers part: the tick, and what was different before it.
 def run_of(spec, q=None, fault=None, **changed):
     scenario, q = asked(spec), np.zeros((5, 7)) if q is None else q
@@ -208,12 +154,6 @@ def test_runs_of_joints_that_slide_part_by_metres(units):
     unit = " or ".join(dict.fromkeys(units))
     (one,) = partings(runs)
     assert f"by more than 1e-06 {unit} at tick 3 (3.00 s), by 0.001 {unit} at most" in str(one)
-
-
-def test_resolvers_that_are_not_strict_need_not_agree():
-    """Neither as the one compared with, nor as the one compared."""
-    runs = [run_of("tpm-published"), run_of("recursive"), run_of("augmented", away_from(1))]
-    assert partings(runs) == []
 
 
 def test_a_backend_that_is_not_installed_leaves_the_default_comparison_and_is_named(monkeypatch):

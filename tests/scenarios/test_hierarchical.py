@@ -2,19 +2,18 @@
 
 import numpy as np
 import pytest
-import tomli_w
 from refusals import refused
 from scene import FRAME, ROBOT, state_at, states
 
 from hierarchy import HierarchyError
 from hierarchy.task import Rows
-from hierarchy.tasks import Pointing, Separation
+from hierarchy.tasks import Pointing
 from hierarchy.tasks.together import TangentCone
 from scenarios import load, simulate
 from scenarios.cell.build import build
 from scenarios.loop.controller import Controller
 from scenarios.measure.metrics import measure
-from solvers import certify, make
+from solvers import make
 
 
 @pytest.mark.parametrize("level", ["velocity", "acceleration"])
@@ -56,20 +55,6 @@ def test_any_start_is_recovered_from_within_the_limit_of_acceleration(name, reso
     assert excess[-1].max() == 0.0
 
 
-def test_every_command_is_certified_in_the_inertia_of_its_tick():
-    """In it bounds are for resolvers of any rows."""
-    controller = Controller(load("ellipse-mass"))
-    cell = controller.cell
-    for tick in range(10):
-        x = controller.command(1e-3 * tick, cell.plant.q, cell.plant.v)
-        np.testing.assert_array_equal(controller.hierarchy.metric, cell.state.mass_matrix())
-        assert certify(controller.hierarchy, x).certified
-        cell.plant.act(x)
-    assert load("ellipse-limits").asks == "bounds"
-    assert load("ellipse-limits", ["control.metric=mass"]).asks == "inequalities"
-    assert load("ellipse", ["control.metric=mass"]).asks == "equalities"
-
-
 def test_all_levels_above_the_posture_are_met_and_their_errors_recorded():
     standing = simulate(load("humanoid"))
     assert standing.fault is None
@@ -87,51 +72,6 @@ def test_all_levels_above_the_posture_are_met_and_their_errors_recorded():
     for task in cell.tasks.listed:
         np.testing.assert_allclose(standing[f"task_error_{task.name.replace(' ', '_')}"][k],
                                    task.error(cell.state), atol=1e-15)
-
-
-# Every kind of `[[tasks]]`: what it is made of, and what it reaches.
-BASE = {"name": "listed", "robot": {"model": "kuka_lwr"},
-        "start": {"q": [0.9, -0.9, 0.9, 1.2, 1.0, 1.0, 0.3]},
-        "control": {"level": "velocity", "stack": "hierarchical", "period": 0.01,
-                    "duration": 1.5, "resolver": "hcod"}, "damping": {"value": 1.0}}
-COUPLING = {"kind": "coupling", "joints": {"joint_2": 1.0, "joint_5": -0.5}, "value": -1.0}
-HAND = {"kind": "position", "frame": "end_effector"}
-LOOK = {"kind": "look-at", "frame": "end_effector", "target": [0.3, 0.9, 0.9]}
-POSED = {"kind": "frame", "frame": "end_effector", "offset": [0.03, 0.05, 0.02],
-         "rotation": [[0.0, 1.0, 0.0], [0.0, 0.0, 1.0], [1.0, 0.0, 0.0]]}
-RELATIVE = {"kind": "relative", "frame": "end_effector", "to": "joint_3",
-            "position": [0.405, -0.065, 0.521]}
-
-
-def scenario_of(tmp_path, *tasks, **sections):
-    """A scenario with these tasks, read from a file as a user's is."""
-    file = tmp_path / "listed.toml"
-    file.write_text(tomli_w.dumps({**BASE, **sections, "tasks": list(tasks)}))
-    return load(file)
-
-
-@pytest.mark.parametrize("level", ["velocity", "acceleration"])
-@pytest.mark.parametrize(("task", "metric"), [
-    (COUPLING, "task_coupling_end"), (POSED, "task_frame_end"), (LOOK, "task_look-at_end"),
-    ({**RELATIVE, "orientation": False}, "task_relative_end"),
-    (RELATIVE | {"position": None, "name": "hold"}, "task_hold_end")])
-def test_a_task_reaches_its_target_at_both_levels(task, metric, level, tmp_path):
-    task = {key: value for key, value in task.items() if value is not None}
-    control = {**BASE["control"], "level": level, "period": 0.005, "duration": 3.0}
-    run = simulate(scenario_of(tmp_path, task, control=control))
-    assert run.fault is None
-    assert measure(run)[metric].value < (0.1 if "look" in metric else 1e-3)  # deg, or m and rad
-
-
-def test_collision_says_where_in_the_list_the_obstacles_come(tmp_path):
-    avoidance = {"kind": "separation", "distance": 0.05, "obstacles": [[0.1, 0.5, 0.1]]}
-    first = build(scenario_of(tmp_path, HAND, avoidance=avoidance))
-    assert first.stack.names == ("separation", "position")
-    listed = {"kind": "collision", "give": 0.01}
-    later = build(scenario_of(tmp_path, HAND, listed, COUPLING, avoidance=avoidance))
-    assert later.stack.names == ("position", "separation", "coupling")
-    assert isinstance(later.stack["separation"], Separation)
-    assert later.tasks.give == {"separation": 0.01}
 
 
 # -- set-based tasks and smooth activation in place of Algorithm 1 --------------------------------

@@ -34,13 +34,6 @@ def test_a_file_without_problems_is_described(command, tmp_path):
     assert re.search(r"^unknowns +none$", said, re.MULTILINE)
 
 
-@pytest.mark.parametrize("name", ["EQ7", "INEQ7", "DEGEN7", *problems.KINDS, "recipe"])
-def test_halves_are_reproducible_and_never_the_same(name):
-    one = family(name)
-    assert one.half(26112907, 2).digest == one.half(26112907, 2).digest
-    assert len({one.half(seed, 2).digest for seed in (0, 1, 2)}) == 3
-
-
 def test_ticks_of_the_humanoid_are_ten_in_a_row_after_its_push_of_runs_that_last(monkeypatch):
     asked = []
 

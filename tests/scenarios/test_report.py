@@ -155,13 +155,6 @@ def test_figures_drawn_anew_take_the_place_of_those_in_the_run_folder(tmp_path, 
     assert not [path for path in run_folder.iterdir() if path.name.startswith(".")]
 
 
-def test_a_run_of_one_tick_has_no_figures_and_leaves_no_folder_for_them(tmp_path):
-    one = save(recording(t=[0.0]), tmp_path / "one")
-    with pytest.raises(HierarchyError, match="one: a run of fewer than two ticks has no figure"):
-        letter.redraw([one], out=tmp_path / "figures")
-    assert [*tmp_path.iterdir()] == [one]
-
-
 def test_the_letters_pairs_are_made_of_its_runs_in_its_order(tmp_path):
     names = ("ellipse-35deg-equality", "ellipse", "ellipse-velocity", "ellipse-35deg", "ellipse-3d")
     runs = [recording(load(name), v=np.full((5, 7), float(i)),

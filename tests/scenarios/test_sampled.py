@@ -200,11 +200,6 @@ def test_the_distance_was_kept_by_runs_that_were_never_below_it():
     assert found["Kept the joint limits"]["tpm"] == (2, 3)
 
 
-def test_runs_that_stopped_for_different_reasons_are_not_the_same():
-    jobs = tuple(Job("", "", "", label=label) for label in "abc")
-    assert Results(jobs, ("fell", "broke", "fell"), {}, {}).alike() == [["a", "c"], ["b"]]
-
-
 @pytest.mark.parametrize(("outlier", "high"), [(12.0, 12.0), (13.0, 11.0), (30.0, 11.0)])
 def test_an_axis_shows_values_up_to_twice_the_width_of_their_middle_away(outlier, high):
     values = np.append(np.linspace(10.0, 11.0, 100), outlier)
@@ -308,16 +303,6 @@ def done(tmp_path_factory):
         found = compare_starts([load("ellipse", SHORT)], ["recursive", "hcod", "augmented"], 7, 3,
                                folder, workers=Workers(1))
     return found, json.loads((folder / "results.json").read_text()), folder
-
-
-def test_strict_resolvers_are_the_same_and_none_is_best_among_them(done):
-    found, data, _ = done
-    columns = data["groups"]["ellipse"]["columns"]
-    speed = columns["hcod"]["metrics"]["speed_max"]
-    assert speed["against_first"]["same"] == speed["count"] == 7
-    assert not speed["best"]
-    assert columns["recursive"]["shares"]["Reached the end"]["met"] == 7
-    assert found.found["ellipse"].alike()[0] == ["recursive", "hcod"]
 
 
 def test_the_page_has_its_verdict_and_links_worst_runs_to_files_that_give_the_same(done):

@@ -59,14 +59,6 @@ def test_a_run_that_ends_in_its_first_tick_is_saved_and_has_nothing_to_export(
     refused("the recording has no tick", export, run, tmp_path / "run.mcap")
 
 
-def test_a_stack_without_tasks_has_a_set_of_no_rows():
-    """Pointing alone, which Algorithm 1 leaves out inside its cone."""
-    keys = {"position": None, "avoidance": None, "limits": None, "pointing.alpha_d": 170.0,
-            "control.duration": 0.003, "control.resolver": "hcod", "control.options": {}}
-    run = simulate(load("ellipse", keys))
-    assert (run.fault, run.orders, run["active_set"].tolist()) == (None, ("",), [0, 0, 0])
-
-
 def test_what_needs_a_whole_run_is_interrupted_with_it():
     """Such as a benchmark of ticks, or the recording of problems, which tried the next run."""
     def interrupt(tick, controller):

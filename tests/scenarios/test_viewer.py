@@ -165,13 +165,6 @@ def test_in_a_browser_the_resolver_is_switched_and_an_obstacle_dragged_in_mid_mo
         assert browser.complaints == []
 
 
-def test_a_path_is_dragged_at_one_metre_per_second_of_the_run():
-    page = LivePage(Live(LIMITED), speed=0.1)
-    page.answer({"path": np.add(page.middle, [1.0, 0.0, 0.0]).tolist()})
-    page.step(0.1)
-    assert page.live.scenario.position.offset[0] == pytest.approx(0.01)
-
-
 def test_a_run_that_is_over_does_not_play():
     assert not LivePage(Live(load("ellipse", ["control.duration=0.001"]))).data()["playing"]
 

@@ -17,22 +17,6 @@ from scenarios.loop.first_tick import first_tick
 from scenarios.toml_text import read_toml
 from solvers import Resolution, Resolver, Status, certify, explain, make, solve_ik
 
-WAYPOINTS = ["position.path.times=[0, 1]", "position.path.points=[[0, 0, 0], [0, 0.1, 0]]"]
-
-
-def test_sections_of_another_kind_are_replaced_by_a_file_that_extends_and_by_keys(tmp_path):
-    path = tmp_path / "mine.toml"
-    path.write_text('extends = "human"\nname = "mine"\n[sensor]\nkind = "exact"\n'
-                    '[plant]\nkind = "kinematic"\n[avoidance]\nkind = "separation"\n'
-                    'obstacles = [[1.0, 1.0, 1.0]]\n'
-                    '[control]\nstack = "hierarchical"\nresolver = "hcod"\noptions = {}\n')
-    found = load(path)
-    assert (found.sensor.kind, found.plant.measurement.velocity_noise) == ("exact", 0.0)
-    assert (found.avoidance.distance, list(found.variation)) == (0.03, ["start.q"])
-    for changes in (["position.path.kind=waypoints", *WAYPOINTS],
-                    [*WAYPOINTS, "position.path.kind=waypoints"]):
-        assert load("ellipse", changes).position.path.times == (0.0, 1.0)
-
 
 def test_rounding_of_a_robot_at_rest_at_its_targets_is_not_said_to_be_missed():
     """A posture was missed by 1.42e-14, held back by grip and tray."""
