@@ -237,7 +237,9 @@ class Part:
         except (OSError, RuntimeError):  # missing, damaged, or LLVM code of a newer LLVM
             return None
         target = llvm.Target.from_triple(llvm.get_process_triple())
-        engine = llvm.create_mcjit_compiler(llvm.parse_assembly(""), target.create_target_machine())
+        engine = llvm.create_mcjit_compiler(
+            llvm.parse_assembly(""), target.create_target_machine(),
+            use_lmm=True)  # code and data next to each other: the way between them has 32 bits
         engine.add_object_file(made)
         engine.finalize_object()
         return engine

@@ -83,6 +83,18 @@ def test_another_processor_makes_code_once_and_compiles_nothing(tmp_path):
         assert re.fullmatch(r"solvers-\w+\.o", made.name)
 
 
+def test_kernels_load_beside_arrays_of_gigabytes(tmp_path):
+    """Code and its constants came to lie on both sides of one; LLVM ended the process."""
+    code = ("import numpy as np\nfrom hierarchy import Hierarchy, Robot, State\n"
+            "from solvers import make\nrobot = Robot.load('kuka_lwr')\n"
+            "large = np.empty(3 * 2**27)\n"
+            "h = Hierarchy.from_levels([([[1.0, 0.0]], [1.0]), (np.eye(2), [0.0, 2.0])])\n"
+            "for name in ('hcod', 'tpm', 'reverse'):\n"
+            "    assert np.abs(make(name).solve(h).x - [1.0, 2.0]).max() < 1e-12\n"
+            "assert np.isfinite(State.at(robot, robot.rest).q).all()\n")
+    assert compiled(code, tmp_path) == []
+
+
 @pytest.mark.parametrize("part", PARTS)
 def test_the_llvm_code_has_no_instruction_of_x86(part):
     module = llvm.parse_bitcode(read_code(FOLDER / f"{part}.bc")[1])
