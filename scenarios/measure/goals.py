@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from hierarchy.problem import Array
-from scenarios.measure.metric import NOTHING, passed, shown, true
+from scenarios.measure.metric import NOTHING, passed, shown
 from scenarios.measure.safety import wanted_forces
 from scenarios.recording.listed import errors
 from scenarios.recording.recording import Recording
@@ -90,7 +90,7 @@ def _tasks(recording: Recording) -> Iterator[_Asked]:
     if scenario.position is not None and "position_error" in recording:
         yield "position", _in_words(scenario.position), "m", recording.off_path(), False
     if scenario.pointing is not None and "pointing_error" in recording:
-        for unit, off in scenario.pointing.sizes(true(recording, "pointing_error")[:, None]):
+        for unit, off in scenario.pointing.sizes(recording.true("pointing_error")[:, None]):
             yield ("pointing", _in_words(scenario.pointing), unit, off,
                    scenario.pointing.one_sided)
     for section, unit, off in errors(recording):
@@ -121,7 +121,7 @@ def _distances(recording: Recording) -> Iterator[_Asked]:
         if avoidance is not None and signal in recording and who in avoidance.promised:
             kept = avoidance.promised[who]
             yield (name, f"{shown(kept, 'm')} or more from obstacles", "m",
-                   np.maximum(kept - true(recording, signal), 0.0), True)
+                   np.maximum(kept - recording.true(signal), 0.0), True)
     if "contact_depth" in recording:
         yield "no contact with obstacles", "", "m", recording["contact_depth"], True
     sticks = [not contact.slides for contact in recording.scenario.contacts]
@@ -131,11 +131,11 @@ def _distances(recording: Recording) -> Iterator[_Asked]:
 
 
 def _limits(recording: Recording) -> Iterator[_Asked]:
-    robot, q = recording.facts.robot, true(recording, "q")
+    robot, q = recording.facts.robot, recording.true("q")
     speeds = [f"{unit}/s" for unit in robot.velocity_units]
     beyond = np.maximum(recording["joint_lower"] - q, q - recording["joint_upper"])
     yield from _of_units("joint limits", robot.position_units, beyond)
-    beyond = np.abs(true(recording, "v")) - recording["velocity_limit"]
+    beyond = np.abs(recording.true("v")) - recording["velocity_limit"]
     yield from _of_units("speed limits", speeds, beyond)
     if "torque_limit" in recording:
         beyond = np.abs(recording["command"]) - recording["torque_limit"]

@@ -104,11 +104,6 @@ def _display(unit: str) -> tuple[float, str, int]:
     return _SHOWN.get(unit, (1.0, unit.replace("^2", "²"), 3))
 
 
-def true(recording: Recording, signal: str) -> Array:
-    """Return a signal as it was, where that is known apart from what was measured."""
-    return recording[f"true_{signal}" if f"true_{signal}" in recording else signal]
-
-
 def passed(off: Array, tolerance: float = 0.0) -> Array:
     """Return the excess (T, ...), at least 0, of a run that is `off` beyond a limit, not rounding.
 

@@ -11,7 +11,7 @@ from hierarchy import plugins
 from hierarchy.errors import expect_each, refuse
 from hierarchy.problem import Array
 from scenarios.measure import safety
-from scenarios.measure.metric import NOTHING, Criteria, finite, known, largest, register, true
+from scenarios.measure.metric import NOTHING, Criteria, finite, known, largest, register
 from scenarios.measure.metric import Metric as Metric
 from scenarios.recording import listed
 from scenarios.recording.blame import blamed
@@ -57,7 +57,7 @@ def _pointing(recording: Recording, by: Criteria) -> Iterator[Metric]:
     if "pointing_error" not in recording or pointing is None:
         return
     half_angle = pointing.alpha_d
-    beyond = pointing.angle(true(recording, "pointing_error")) - half_angle
+    beyond = pointing.angle(recording.true("pointing_error")) - half_angle
     yield _tracks("cone_violation_max", "Beyond the cone, max",
                   finite(max(float(beyond.max()), 0.0)), "deg", note=f"a cone of {half_angle:g}°")
     yield _tracks("cone_violation_share", "Time outside the cone",
@@ -96,7 +96,7 @@ def _returning(recording: Recording, by: Criteria) -> Iterator[Metric]:
     found = _left_path(recording)
     if found is None:
         return
-    (spans, error), t, v, group = found, recording["t"], true(recording, "v"), "Singularities"
+    (spans, error), t, v, group = found, recording["t"], recording.true("v"), "Singularities"
     within, back = (np.all([(t < begin) | (t > end + after) for begin, end in spans], axis=0)
                     for after in (0.0, _AFTER))
     still = np.abs(v).max(axis=1, initial=0.0) < _STILL

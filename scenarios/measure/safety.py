@@ -16,7 +16,6 @@ from scenarios.measure.metric import (
     least,
     passed,
     register,
-    true,
 )
 from scenarios.recording.recording import Recording
 
@@ -40,7 +39,7 @@ def _distances(recording: Recording, by: Criteria) -> Iterator[Metric]:
                                ("ee", "ee_distance", "End effector")):
         if signal not in recording:
             continue
-        apart, kept = f"true_{signal}" in recording, true(recording, signal)
+        apart, kept = f"true_{signal}" in recording, recording.true(signal)
         seen = not apart and recording.scenario.sensor.kind != "exact"
         yield _metric(f"{who}_distance_min", f"{label} distance, min", least(kept), "m", False,
                       note="as measured: the true one is not known" if seen else "")
@@ -70,7 +69,7 @@ def _contacts(recording: Recording, by: Criteria) -> Iterator[Metric]:
 def _motion(recording: Recording, by: Criteria) -> Iterator[Metric]:
     control, first = recording.scenario.control, recording.facts.robot.actuated
     v, a, command = (values[:, first:] for values in (
-        true(recording, "v"), recording["a"], recording["command"]))
+        recording.true("v"), recording["a"], recording["command"]))
     speed, rate = units_of(recording, "/s"), units_of(recording, "/s^2")
     yield _joint_limit_excess(recording)
     yield _metric("speed_max", "Joint speed, max", largest(v), speed)
@@ -115,7 +114,7 @@ def steps(key: str, label: str, values: Array, unit: str, note: str = "", group:
 
 def _joint_limit_excess(recording: Recording) -> Metric:
     value, note = None, "the robot has no joint limits"
-    lower, upper, q = recording["joint_lower"], recording["joint_upper"], true(recording, "q")
+    lower, upper, q = recording["joint_lower"], recording["joint_upper"], recording.true("q")
     if np.isfinite(lower).any() or np.isfinite(upper).any():
         excess = passed(np.maximum(np.maximum(q - upper, lower - q), 0.0)).max(axis=0)
         joint = int(np.argmax(excess))
@@ -224,8 +223,8 @@ def standing(recording: Recording) -> bool | None:
     if scenario.control.duration < pushed + REST or not recording.ticks:
         return None
     last = t > scenario.control.duration - REST
-    q, height = true(recording, "q")[last], recording["com"][:, 2]
+    q, height = recording.true("q")[last], recording["com"][:, 2]
     beyond = np.maximum(q - recording["joint_upper"], recording["joint_lower"] - q)
     return recording.fault is None and bool(
-        np.abs(true(recording, "v")[last]).max() < CALM and beyond.max() < _BEYOND
+        np.abs(recording.true("v")[last]).max() < CALM and beyond.max() < _BEYOND
         and height[0] - height[last].min() < SUNK and (recording["support_margin"][last] > 0).all())

@@ -73,5 +73,5 @@ def errors(recording: Recording) -> Iterator[tuple[ListedTask, str, Array]]:
     for section in recording.scenario.tasks:
         name = error_of(section.title)
         if name in recording:
-            for unit, size in section.sizes(recording.get(f"true_{name}", recording[name])):
+            for unit, size in section.sizes(recording.true(name)):
                 yield section, section.unit_among(units) if unit == JOINT else unit, size

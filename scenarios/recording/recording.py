@@ -218,10 +218,14 @@ class Recording:
         names: NDArray[Any] = np.array(self.orders or ("",), dtype=np.str_)
         return np.asarray(names[self.signals["order"]])
 
+    def true(self, name: str) -> Array:
+        """Return a signal as it was, where that is known apart from what was measured."""
+        return self.signals.get(f"true_{name}", self[name])
+
     def off_path(self) -> Array:
         """Return how far the end effector truly was from the path of [position] (T,) [m]."""
-        at = self.get("true_ee_position", self["ee_position"])
-        return np.asarray(np.linalg.norm(self["desired_position"] - at, axis=1))
+        apart = self["desired_position"] - self.true("ee_position")
+        return np.asarray(np.linalg.norm(apart, axis=1))
 
     def switches(self) -> NDArray[np.int64]:
         """Ticks k at which the order of the stack differs from that of tick k - 1."""

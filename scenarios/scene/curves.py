@@ -46,22 +46,22 @@ def series(recording: Recording, ticks: NDArray[np.int64]) -> Iterator[Series]:
     """Yield the curves for which a recording has the signals, at some ticks."""
     scenario = recording.scenario
     if "position_error" in recording:
-        error = 1e3 * np.linalg.norm(recording["position_error"], axis=1)
-        yield _sampled("Distance from the path", "mm", ("end effector",), error, ticks,
-                       logarithmic=True)
+        yield _sampled("Distance from the path", "mm", ("end effector",),
+                       1e3 * recording.off_path(), ticks, logarithmic=True)
     if "pointing_error" in recording and scenario.pointing is not None:
         yield _sampled("Angle to the cone's axis", "°", ("end effector",),
-                       scenario.pointing.angle(recording["pointing_error"]), ticks,
+                       scenario.pointing.angle(recording.true("pointing_error")), ticks,
                        (("α_d", scenario.pointing.alpha_d),))
     for what, of, signal in (("Body", "body", "minimal_distance"),
                              ("End effector", "ee", "ee_distance")):
         if signal in recording and scenario.avoidance is not None:
+            marks = marks_of(scenario.avoidance.thresholds[of])
             yield _sampled(f"{what} to the nearest obstacle", "m", (what.lower(),),
-                           recording[signal], ticks, marks_of(scenario.avoidance.thresholds[of]))
+                           recording.true(signal), ticks, marks)
     yield from _task_errors(recording, ticks)
     yield from _forces(recording, ticks)
-    yield _sampled("Joint speeds", "rad/s", recording.facts.robot.speed_names, recording["v"],
-                   ticks)
+    yield _sampled("Joint speeds", "rad/s", recording.facts.robot.speed_names,
+                   recording.true("v"), ticks)
 
 
 def _task_errors(recording: Recording, ticks: NDArray[np.int64]) -> Iterator[Series]:

@@ -101,7 +101,7 @@ def scene(recording: Recording, rate: float = 30.0,
     robot, avoidance, pointing = facts.robot, scenario.avoidance, scenario.pointing
     cone = None if pointing is None else np.asarray(pointing.axis) / np.linalg.norm(pointing.axis)
     obstacles = make_obstacles(avoidance.placed if avoidance else ())
-    placements = robot.placements(recording.get("true_q", recording["q"])[ticks])
+    placements = robot.placements(recording.true("q")[ticks])
     z = placements[:, robot.points[-1].joint, :9].reshape(-1, 3, 3).swapaxes(1, 2) @ np.array(
         robot.tool)[:, 2]
     moved = _distances(obstacles, recording, ticks, placements)
@@ -123,7 +123,7 @@ def scene(recording: Recording, rate: float = 30.0,
 
 def _frames(recording: Recording, rate: float) -> NDArray[np.int64]:
     """Return the ticks nearest to the frames' times, including the first and the last tick."""
-    finite = np.flatnonzero(np.isfinite(recording.get("true_q", recording["q"])).all(axis=1))
+    finite = np.flatnonzero(np.isfinite(recording.true("q")).all(axis=1))
     refuse(not finite.size, "the recording has no tick: there is nothing to draw")
     t = recording["t"][finite]
     step = max(1.0 / rate, recording.scenario.control.period)
@@ -174,6 +174,6 @@ def moved_by_tasks(recording: Recording, ticks: NDArray[np.int64] | slice = slic
     for section in recording.scenario.tasks:
         if listed.position_of(section.title) not in recording:
             continue
-        actual = recording[listed.position_of(section.title)][ticks]
-        error = recording[listed.error_of(section.title)][ticks]
+        actual = recording.true(listed.position_of(section.title))[ticks]
+        error = recording.true(listed.error_of(section.title))[ticks]
         yield Moved(section.title, actual, section.wanted(actual, error))

@@ -229,6 +229,27 @@ def test_a_picture_links_the_body_with_the_surface_and_shows_where_listed_tasks_
     assert not letter.PANEL["active-point"].shows(run)  # rows push all points at once
 
 
+def test_curves_and_pictures_are_those_of_the_true_arm():
+    """They were of what was measured, beside a true arm and a table of true errors."""
+    run = simulate(load("ellipse", {"control.duration": 0.02,
+                                    "plant.measurement": {"position_noise": 0.003}}))
+    shown = {one.name: one.value for one in scene(run, ticks=np.arange(run.ticks)).series}
+    off = np.linalg.norm(run["desired_position"] - run["true_ee_position"], axis=1)
+    angle = run.scenario.pointing.angle(run["true_pointing_error"])
+    for name, true in (("Distance from the path", 1e3 * off), ("Angle to the cone's axis", angle),
+                       ("Joint speeds", run["true_v"])):
+        np.testing.assert_allclose(shown[name], true.reshape(run.ticks, -1), rtol=1e-12)
+    lines = [line.get_xydata() for line in picture.picture({"hcod": run}).axes[0].lines]
+    walked = drawing.project(run["true_ee_position"])
+    assert any(line.shape == walked.shape and np.allclose(line, walked) for line in lines)
+    fig = letter.stacked([(run, [letter.PANEL[name] for name in (
+        "joint-velocities", "position-components")])], "")
+    drawn = [line.get_ydata() for ax in fig.axes for line in ax.lines]
+    apart = 1e3 * (run["desired_position"] - run["true_ee_position"])
+    for true in (*run["true_v"].T, *apart.T):
+        assert any(line.shape == true.shape and np.allclose(line, true) for line in drawn)
+
+
 def test_a_replay_that_would_be_too_large_has_fewer_frames_a_second_but_five(monkeypatch):
     monkeypatch.setattr(results_page, "html", lambda *_, rate, **__: int(100 * rate) * "x")
     found = motions([made(LETTER)])

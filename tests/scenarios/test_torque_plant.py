@@ -181,8 +181,9 @@ def test_torques_follow_with_the_bandwidth_of_the_motors():
 def recorded(fault=None, pushes=(), **changes):
     """A run of 5 s in which a robot stands still, but for what is changed."""
     t = np.arange(0.0, 5.0, 0.01)
-    run = type("Run", (dict,), {"ticks": t.size, "fault": fault, "scenario": SimpleNamespace(
-        control=SimpleNamespace(duration=5.0), plant=SimpleNamespace(pushes=pushes))})
+    run = type("Run", (dict,), {
+        "ticks": t.size, "fault": fault, "true": dict.get, "scenario": SimpleNamespace(
+            control=SimpleNamespace(duration=5.0), plant=SimpleNamespace(pushes=pushes))})
     return run({"t": t, "v": np.zeros((t.size, 2)), "q": np.zeros((t.size, 2)),
                 "com": np.tile([0.0, 0.0, 0.8], (t.size, 1)),
                 "support_margin": np.full(t.size, 0.1), "joint_lower": np.full(2, -1.0),

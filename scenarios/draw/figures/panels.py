@@ -52,8 +52,9 @@ class Panel:
 
 def position_components(ax: Axes, recording: Recording, colour: str) -> None:
     """Draw each component of the position error [mm], as figure 10 (a) does."""
+    apart = recording["desired_position"] - recording.true("ee_position")
     for i, axis in enumerate("xyz"):
-        drawing.curve(ax, recording["t"], 1e3 * recording["position_error"][:, i],
+        drawing.curve(ax, recording["t"], 1e3 * apart[:, i],
                       **drawing.joint_line(i), linewidth=0.9, label=axis)
 
 
@@ -66,7 +67,7 @@ def joints(ax: Axes, recording: Recording, colour: str, signal: str, width: floa
     """
     peaks = np.abs(recording["v"]).max(axis=0)
     fastest = np.sort(np.argsort(-peaks, kind="stable")[:len(drawing.JOINTS)]).tolist()
-    values, names = recording[signal].T, recording.facts.robot.speed_names
+    values, names = recording.true(signal).T, recording.facts.robot.speed_names
     above = dict.fromkeys(str(line.get_label()) for other in ax.figure.axes for line in other.lines)
     if len(known := [names.index(name) for name in above if name in names]) == len(drawing.JOINTS):
         fastest = known
@@ -83,11 +84,11 @@ def distance(ax: Axes, recording: Recording, colour: str, signal: str) -> None:
     The true one has the measured one behind it; where no other is known, it is the measured one.
     """
     t, measured, avoidance = recording["t"], recording[signal], recording.scenario.avoidance
-    if true := f"true_{signal}" in recording:
+    if f"true_{signal}" in recording:
         drawing.curve(ax, t, np.where(np.isfinite(measured), measured, np.nan), color=MEASURED,
                       linewidth=0.7, label="measured")
-    shown = recording[f"true_{signal}"] if true else measured
-    drawing.curve(ax, t, shown, color=colour, label="true" if true else None)
+    shown = recording.true(signal)
+    drawing.curve(ax, t, shown, color=colour, label=None if shown is measured else "true")
     tip = signal == "ee_distance"
     if tip:
         _in_red(ax, t, shown, recording["repulsion_active"])
@@ -115,7 +116,7 @@ def active_point(ax: Axes, recording: Recording, colour: str) -> None:
 
 def pointing_error(ax: Axes, recording: Recording, colour: str) -> None:
     """Draw figure 7: cos(alpha_d) - cos(alpha), in red while the task is in the stack."""
-    t, error = recording["t"], recording["pointing_error"]
+    t, error = recording["t"], recording.true("pointing_error")
     drawing.curve(ax, t, error, color=colour)
     _in_red(ax, t, error, recording["pointing_active"])
     ax.axhline(0.0, color=INK, linewidth=0.6, linestyle=_DASHED)

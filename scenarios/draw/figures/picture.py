@@ -55,7 +55,7 @@ def picture(recordings: Mapping[str, Recording], colours: Mapping[str, str] | No
     _points(ax, seen, linked=_exact(first))
     for label, colour in reversed(list(chosen.items())):
         run = recordings[label]
-        for actual in (run["ee_position"], *(moved.actual for moved in moved_by_tasks(run))):
+        for actual in (run.true("ee_position"), *(moved.actual for moved in moved_by_tasks(run))):
             _line(ax, drawing.project(actual), color=colour, linewidth=1.8)
     wanted = [first["desired_position"]] if "desired_position" in first else []
     for path in (*wanted, *(m.wanted for m in moved_by_tasks(first) if m.wanted is not None)):
@@ -134,8 +134,8 @@ def _exact(recording: Recording) -> bool:
 def _arms(ax: Axes, recording: Recording, nearest: int) -> None:
     others = np.linspace(0, recording.ticks - 1, _OTHER_POSES).astype(int)
     for k, alpha in (*((int(k), 0.16) for k in others), (nearest, 0.9)):
-        placements = recording.facts.robot.placements(recording["q"][k])
-        tip = recording["ee_position"][k]
+        placements = recording.facts.robot.placements(recording.true("q")[k])
+        tip = recording.true("ee_position")[k]
         chain = drawing.project(np.vstack([np.zeros(3), placements[1:, 9:], tip]))
         ax.plot(*chain.T, color=INK, alpha=alpha, linewidth=5.0 if k == nearest else 2.5,
                 solid_capstyle="round", solid_joinstyle="round")
@@ -168,7 +168,7 @@ def _bodies(recordings: Mapping[str, Recording], colours: Mapping[str, str]) -> 
         _POSES * apart))
     for i, k in enumerate(ticks):
         aside = np.array([i * apart, 0.0])
-        _body(ax, robot, first["q"][k], aside)
+        _body(ax, robot, first.true("q")[k], aside)
         for label, colour in reversed(list(colours.items())):
             run = recordings[label]
             for moved in moved_by_tasks(run):
@@ -214,7 +214,7 @@ def _flat(points: Array) -> Array:
 
 def _extent(robot: RobotFacts, recording: Recording, ticks: Array) -> tuple[float, float, float]:
     """Return the greatest width [m] of the drawn bodies, and their lowest and highest point."""
-    flat = _flat(ends(robot.capsules, robot.placements(recording["q"][ticks])))
+    flat = _flat(ends(robot.capsules, robot.placements(recording.true("q")[ticks])))
     radii = np.array([link.radius for link in robot.capsules])[:, None, None]
     low, high = (flat - radii).min(axis=(1, 2)), (flat + radii).max(axis=(1, 2))
     return float((high - low)[:, 0].max()), float(low[:, 1].min()), float(high[:, 1].max())
