@@ -106,6 +106,15 @@ def test_a_changed_helper_or_number_is_noticed(ask, tmp_path, file, old, new):
     assert ask()[0] == ["101.0", "1"]
 
 
+def test_a_file_that_changes_while_a_process_runs_is_noticed(ask):
+    """A module loaded again had its old code; a later process had that of one begun before."""
+    edit = "p = Path(user.__file__); p.write_text(p.read_text().replace('f(x)', 'f(x) + 90.0'))\n"
+    begun = f"import user\nfrom importlib import reload\nfrom pathlib import Path\n{edit}"
+    assert ask(f"{begun}print(user.g(10.0))")[0] == ["11.0"]
+    assert ask(SOLVE)[0] == ["101.0", "1"]
+    assert ask(f"{begun}{edit}user.g(10.0); print(reload(user).g(10.0))")[0] == ["281.0"]
+
+
 @pytest.mark.parametrize("change", [
     lambda path: path.write_bytes(path.read_bytes()[:50]),
     lambda path: path.write_bytes(path.read_bytes()[:-1] + bytes([path.read_bytes()[-1] ^ 1])),
