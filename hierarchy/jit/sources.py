@@ -34,8 +34,7 @@ def behind(functions: Iterable[Kernel]) -> tuple[set[str], set[str]]:
         if function not in seen:
             seen.add(function)
             own = [cell.cell_contents for cell in function.__closure__ or ()]
-            used = dict(zip(code.co_freevars, own, strict=True)) | {
-                name: known[name] for name in code.co_names if name in known}
+            used = dict(zip(code.co_freevars, own, strict=True)) | _named(code.co_names, known)
             ahead += [value.py_func for value in used.values() if hasattr(value, "py_func")]
             numbers = {name: value.tolist() if hasattr(value, "tolist") else value for name, value
                        in used.items() if not callable(value) and type(value) is not ModuleType}
@@ -50,6 +49,16 @@ def behind(functions: Iterable[Kernel]) -> tuple[set[str], set[str]]:
             elif name.isupper() and isinstance(value, (int, float, np.integer)):
                 constants.add(f"{name} = {value!r}")
     return digests, constants
+
+
+def _named(names: tuple[str, ...], known: dict[str, Any]) -> dict[str, Any]:
+    """Return what code with these names finds in its module, and in modules that it names."""
+    used, scopes = dict[str, Any](), [known]
+    for scope in scopes:
+        used |= {f"{scope.get('__name__')}.{name}": scope[name] for name in names if name in scope}
+        scopes += [vars(value) for value in used.values() if type(value) is ModuleType
+                   and all(vars(value) is not one for one in scopes)]
+    return used
 
 
 def source_digest(*functions: Any) -> str:
