@@ -128,18 +128,20 @@ def _body(file: Path, content: bytes) -> bytes:
     return body
 
 
-def write(file: Path, body: bytes) -> None:
-    """Write a file completely or not at all; others may read it."""
+def write(file: Path, body: bytes) -> str:
+    """Write a file completely or not at all; others may read it. Returns its checksum."""
+    checksum = _checksum(file, body)
     file.parent.mkdir(parents=True, exist_ok=True)
     number, name = tempfile.mkstemp(dir=file.parent)
     try:
         with os.fdopen(number, "wb") as opened:
-            opened.write(_checksum(file, body) + body)
+            opened.write(checksum + body)
         Path(name).chmod(0o644)
         Path(name).replace(file)
     except BaseException:
         Path(name).unlink()
         raise
+    return checksum.hex()
 
 
 def _checksum(file: Path, body: bytes) -> bytes:
@@ -197,12 +199,14 @@ class Part:
     """An object file and its index.
 
     calls : digest of the list of calls that it was made for.
+    checksums : of the object file (".o") and the LLVM code (".bc") that were made with the index.
     entries : by name of the kernel and types of arguments, as `name(types)`.
     externals : the names that the object file expects to find.
     """
 
     file: Path
     calls: str
+    checksums: dict[str, str]
     entries: dict[str, Code]
     externals: tuple[str, ...]
 
@@ -211,16 +215,15 @@ class Part:
         """Read the index beside an object file; None if it is missing or damaged."""
         try:
             index = json.loads(shipped(file.with_suffix(".index")))
-            return Part(file, index["calls"],
+            return Part(file, index["calls"], index["checksums"],
                         {call: Code(**entry) for call, entry in index["entries"].items()},
                         tuple(index["externals"]))
         except (OSError, ValueError, LookupError, TypeError, AttributeError):
             return None
 
-    def write(self, code: bytes) -> None:
-        """Write both files, the object first."""
-        write(self.file, code)
-        index = {"calls": self.calls, "externals": self.externals,
+    def write(self) -> None:
+        """Write the index; the other files are there."""
+        index = {"calls": self.calls, "checksums": self.checksums, "externals": self.externals,
                  "entries": {call: entry._asdict() for call, entry in self.entries.items()}}
         write(self.file.with_suffix(".index"), json.dumps(index, indent=1).encode())
 
@@ -233,8 +236,8 @@ class Part:
             return None
         try:
             made = llvm.ObjectFileRef.from_data(
-                shipped(self.file) if suits() else self._made_here())
-        except (OSError, RuntimeError):  # missing, damaged, or LLVM code of a newer LLVM
+                self.content(".o") if suits() else self._made_here())
+        except (OSError, RuntimeError):  # no such file, or LLVM code of a newer LLVM
             return None
         target = llvm.Target.from_triple(llvm.get_process_triple())
         engine = llvm.create_mcjit_compiler(
@@ -244,9 +247,24 @@ class Part:
         engine.finalize_object()
         return engine
 
+    def content(self, kind: str) -> bytes:
+        """Return one of the files; raises OSError if it is missing, damaged or of another build."""
+        file = self.file.with_suffix(kind)
+        content = file.read_bytes()
+        if content[:_CHECKSUM].hex() != self.checksums[kind]:
+            raise OSError(f"{file} is of another build")
+        return _body(file, content)
+
+    def is_whole(self) -> bool:
+        """Whether the files are there and of one build."""
+        try:
+            return bool(self.content(".o") and self.content(".bc"))
+        except OSError:
+            return False
+
     def _made_here(self) -> bytes:
         """Return the object file for another processor, made of the LLVM code once."""
-        code, here, folder = read_code(self.file.with_suffix(".bc"))[1], machine(), cache_folder()
+        code, here, folder = self.content(".bc")[_DIGEST:], machine(), cache_folder()
         about = hashlib.sha256(code + repr((here, llvmlite.__version__)).encode()).hexdigest()
         file = None if folder is None else folder / f"{self.file.stem}-{about[:32]}.o"
         kept = None if file is None else _read(file)

@@ -14,7 +14,7 @@ import numpy as np
 from hierarchy.jit.caching import KernelCache, find
 from hierarchy.jit.inside import CPUDispatcher, NumbaError, global_compiler_lock
 from hierarchy.jit.linking import name_of, naming
-from hierarchy.jit.sources import Kernel, described
+from hierarchy.jit.sources import Kernel, described, digest_of
 
 # What makes an array; a kernel that uses another way of numpy fails to compile, and belongs here.
 _MAKERS = {"empty", "empty_like", "zeros", "zeros_like", "ones", "full", "eye", "copy", "array"}
@@ -53,6 +53,8 @@ def inlined(function: Kernel) -> Kernel:
 def _compiled(function: Kernel, kind: type[Cached] | None = None, nogil: bool = False) -> Kernel:
     if numba.config.DISABLE_JIT:
         return function
+    with suppress(OSError):  # the file may change before the kernel is needed
+        function.digest = digest_of(function)  # type: ignore[attr-defined]
     allocates = _allocates(function)
     kernel: Any = numba.njit(error_model="numpy", forceinline=kind is OnlyInlined, nogil=nogil,
                              _nrt=allocates, no_cpython_wrapper=kind is not None,

@@ -161,12 +161,13 @@ def build(file: Path, of: str, calls: Sequence[str], say: Callable[[int], None],
         libraries.append(_library(functions))
     names = {name for entry in entries.values() for name in (entry.wrapper, entry.environment)}
     whole = linked(libraries, {*names, *functions})
-    write(file.with_suffix(".bc"), _digest(functions) + stripped(whole.clone()).as_bitcode())
+    code = _digest(functions) + stripped(whole.clone()).as_bitcode()
+    checksums = {".bc": write(file.with_suffix(".bc"), code)}
     hide(whole, names)
-    code = object_code(whole, machine())
+    checksums[".o"] = write(file, object_code(whole, machine()))
     externals = sorted(one.name for one in (*whole.functions, *whole.global_variables)
                        if one.is_declaration and not one.name.startswith("llvm."))
-    Part(file, of, entries, tuple(externals)).write(code)
+    Part(file, of, checksums, entries, tuple(externals)).write()
 
 
 def _compiled(calls: Sequence[str], say: Callable[[int], None]
@@ -194,6 +195,6 @@ def _compiled(calls: Sequence[str], say: Callable[[int], None]
 def is_current(file: Path, of: str) -> bool:
     """Whether an object file was made of this list of calls from the sources as they are."""
     part = Part.read(file)
-    return part is not None and part.calls == of and all(
+    return part is not None and part.calls == of and part.is_whole() and all(
         entry.digest == source_digest(found(call.partition("(")[0]))
         for call, entry in part.entries.items())

@@ -23,24 +23,23 @@ _KIND = re.compile(r"(readonly )?array\((\w+), (\d)d, (\w)\)|([\w.]+)(\()?|\)")
 
 
 def behind(functions: Iterable[Kernel]) -> tuple[set[str], set[str]]:
-    """Return the files of functions and of all kernels that they know, and the numbers in these.
+    """Return digests of files of functions and all kernels that they know, and numbers in these.
 
     Those are numbers, arrays and the like that a kernel names, also of a function that made it.
     """
-    files, constants, ahead, seen = set[str](), set[str](), list(functions), set[Any]()
+    digests, constants, ahead, seen = set[str](), set[str](), list(functions), set[Any]()
     while ahead:
         function = ahead.pop()
         known, code = function.__globals__, function.__code__
         if function not in seen:
             seen.add(function)
             own = [cell.cell_contents for cell in function.__closure__ or ()]
-            used = dict(zip(code.co_freevars, own, strict=True)) | {
-                name: known[name] for name in code.co_names if name in known}
+            used = dict(zip(code.co_freevars, own, strict=True)) | _named(code.co_names, known)
             ahead += [value.py_func for value in used.values() if hasattr(value, "py_func")]
             numbers = {name: value.tolist() if hasattr(value, "tolist") else value for name, value
                        in used.items() if not callable(value) and type(value) is not ModuleType}
             constants.add(f"{function.__qualname__}: {numbers!r}")
-        files.add(known.get("__file__", code.co_filename))  # bundled code has no path
+        digests.add(getattr(function, "digest", "") or digest_of(function))
         if id(known) in seen:
             continue
         seen.add(id(known))
@@ -49,7 +48,17 @@ def behind(functions: Iterable[Kernel]) -> tuple[set[str], set[str]]:
                 ahead.append(value.py_func)
             elif name.isupper() and isinstance(value, (int, float, np.integer)):
                 constants.add(f"{name} = {value!r}")
-    return files, constants
+    return digests, constants
+
+
+def _named(names: tuple[str, ...], known: dict[str, Any]) -> dict[str, Any]:
+    """Return what code with these names finds in its module, and in modules that it names."""
+    used, scopes = dict[str, Any](), [known]
+    for scope in scopes:
+        used |= {f"{scope.get('__name__')}.{name}": scope[name] for name in names if name in scope}
+        scopes += [vars(value) for value in used.values() if type(value) is ModuleType
+                   and all(vars(value) is not one for one in scopes)]
+    return used
 
 
 def source_digest(*functions: Any) -> str:
@@ -57,17 +66,23 @@ def source_digest(*functions: Any) -> str:
 
     It is "" if a file is not to be found: that of a cell of a notebook, or in an archive.
     """
-    files, constants = behind(getattr(function, "py_func", function) for function in functions)
     try:
-        content = "\n".join((*sorted(map(digest_of, (*files, *_OWN))), *sorted(constants)))
+        digests, constants = behind(getattr(one, "py_func", one) for one in functions)
+        content = "\n".join((*sorted(digests | set(map(_digest_of, _OWN))), *sorted(constants)))
     except OSError:
         return ""
     return hashlib.sha256(content.encode()).hexdigest()
 
 
+def digest_of(function: Kernel) -> str:
+    """Return the digest of the file of a function as it is now; raises OSError if it is missing."""
+    file = function.__globals__.get("__file__", function.__code__.co_filename)  # if bundled
+    status = Path(file).stat()
+    return _digest_of(file, status.st_mtime_ns, status.st_size)
+
+
 @cache
-def digest_of(file: str) -> str:
-    """Return the digest of one file."""
+def _digest_of(file: str, *_: int) -> str:
     return hashlib.sha256(Path(file).read_bytes()).hexdigest()
 
 

@@ -95,6 +95,19 @@ def ask(made, tmp_path):
         tmp_path, code, **{"XDG_CACHE_HOME": str(tmp_path / "cache"), **settings})
 
 
+@pytest.mark.parametrize("named", ["helper.ONE", "helper.os.ONE", "helper.near(0.0)"])
+def test_a_change_of_what_a_kernel_names_in_a_module_is_noticed(ask, tmp_path, named):
+    """It had the number of the run before."""
+    (tmp_path / "user.py").write_text(MODULES["user.py"].replace("f(x)", f"x + {named}").replace(
+        "from helper import f", "import helper"))
+    for one in "1.0", "91.0":
+        (tmp_path / "helper.py").write_text(
+            f"import os\nimport numba\nONE = os.ONE = {one}\n"
+            f"@numba.njit\ndef near(x):\n    return x + {one}\n")
+        assert ask()[0] == [str(10.0 + float(one)), "1"]
+    assert ask()[0] == ["101.0", "0"]
+
+
 def files(folder):
     return [path for path in folder.rglob("*") if path.is_file() and "__pycache__" not in str(path)]
 
@@ -104,6 +117,15 @@ def files(folder):
 def test_a_changed_helper_or_number_is_noticed(ask, tmp_path, file, old, new):
     (tmp_path / file).write_text((tmp_path / file).read_text().replace(old, new))
     assert ask()[0] == ["101.0", "1"]
+
+
+def test_a_file_that_changes_while_a_process_runs_is_noticed(ask):
+    """A module loaded again had its old code; a later process had that of one begun before."""
+    edit = "p = Path(user.__file__); p.write_text(p.read_text().replace('f(x)', 'f(x) + 90.0'))\n"
+    begun = f"import user\nfrom importlib import reload\nfrom pathlib import Path\n{edit}"
+    assert ask(f"{begun}print(user.g(10.0))")[0] == ["11.0"]
+    assert ask(SOLVE)[0] == ["101.0", "1"]
+    assert ask(f"{begun}{edit}user.g(10.0); print(reload(user).g(10.0))")[0] == ["281.0"]
 
 
 @pytest.mark.parametrize("change", [
