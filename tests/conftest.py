@@ -19,14 +19,14 @@ settings.register_profile("any machine", deadline=None,
                           suppress_health_check=[HealthCheck.too_slow])
 settings.load_profile("any machine")
 
-SLOW = frozenset(Path(__file__).with_name("slow.txt").read_text().split())
+SLOW = frozenset(Path(__file__).with_name("slow.txt").read_text().splitlines())
 
 
 @pytest.hookimpl(tryfirst=True)
 def pytest_collection_modifyitems(items):
     """Mark the tests of a second or more, as `pytest --durations=0` finds them."""
     for item in items:
-        if item.nodeid.partition("[")[0] in SLOW:
+        if not SLOW.isdisjoint((item.nodeid, item.nodeid.partition("[")[0])):
             item.add_marker("slow")
 
 
