@@ -70,6 +70,11 @@ class Controller:
         return self.resolution is not self._unanswered
 
     @property
+    def planned(self) -> bool:
+        """Whether the tick has an x, also an inaccurate one: contact forces to count on."""
+        return self.resolution.status is not Status.NUMERICAL_FAILURE
+
+    @property
     def meant(self) -> Array:
         """What the command stands for in the rows: itself, or at level "torque" the answer."""
         return self.sent if self.cell.contacts is None else self.resolution.x
@@ -100,7 +105,7 @@ class Controller:
         self.sent = sent = self.policy.choose(t, troubles, x, state.v, forces)
         if self.level != "acceleration":
             state.commanded = sent
-        if cell_contacts is not None and self.resolution.status is not Status.NUMERICAL_FAILURE:
+        if cell_contacts is not None and self.planned:
             state.carried = cell_contacts.carried(t, self.resolution.x, state.carried)
         return sent
 

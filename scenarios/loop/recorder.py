@@ -20,7 +20,6 @@ from scenarios.recording import listed
 from scenarios.recording.facts import facts_of, placed_points
 from scenarios.recording.recording import Event, Recording
 from scenarios.recording.signals import check_shapes, known
-from solvers import Status
 
 FASTEST = 1e3  # [rad/s or m/s] of a joint; a faster motion has diverged
 _CHOICES = ("order", "active_control_point", "repulsion_active", "status", "iterations")
@@ -127,7 +126,7 @@ class Recorder:
         finite = self._write_rest(
             k, (index, active, repulsion, resolution.status, resolution.iterations),
             (cell.state.t, controller.cone_error, *controller.stamps))
-        if cell.contacts is not None and resolution.status is not Status.NUMERICAL_FAILURE:
+        if cell.contacts is not None and controller.planned:
             self._answers[k] = resolution.x
         if self._blend is not None:
             self._weights[k] = self._blend.weight

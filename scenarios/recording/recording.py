@@ -222,10 +222,13 @@ class Recording:
         """Return a signal as it was, where that is known apart from what was measured."""
         return self.signals.get(f"true_{name}", self[name])
 
+    def path_error(self) -> Array:
+        """Return the path of [position] minus where the end effector truly was (T, 3) [m]."""
+        return np.asarray(self["desired_position"] - self.true("ee_position"))
+
     def off_path(self) -> Array:
-        """Return how far the end effector truly was from the path of [position] (T,) [m]."""
-        apart = self["desired_position"] - self.true("ee_position")
-        return np.asarray(np.linalg.norm(apart, axis=1))
+        """Return the norm of `path_error` (T,) [m]."""
+        return np.asarray(np.linalg.norm(self.path_error(), axis=1))
 
     def switches(self) -> NDArray[np.int64]:
         """Ticks k at which the order of the stack differs from that of tick k - 1."""

@@ -52,10 +52,9 @@ class Panel:
 
 def position_components(ax: Axes, recording: Recording, colour: str) -> None:
     """Draw each component of the position error [mm], as figure 10 (a) does."""
-    apart = recording["desired_position"] - recording.true("ee_position")
-    for i, axis in enumerate("xyz"):
-        drawing.curve(ax, recording["t"], 1e3 * apart[:, i],
-                      **drawing.joint_line(i), linewidth=0.9, label=axis)
+    for i, (axis, error) in enumerate(zip("xyz", recording.path_error().T, strict=True)):
+        drawing.curve(ax, recording["t"], 1e3 * error, **drawing.joint_line(i), linewidth=0.9,
+                      label=axis)
 
 
 def joints(ax: Axes, recording: Recording, colour: str, signal: str, width: float,
@@ -84,11 +83,11 @@ def distance(ax: Axes, recording: Recording, colour: str, signal: str) -> None:
     The true one has the measured one behind it; where no other is known, it is the measured one.
     """
     t, measured, avoidance = recording["t"], recording[signal], recording.scenario.avoidance
-    if f"true_{signal}" in recording:
+    shown = recording.true(signal)
+    if apart := shown is not measured:
         drawing.curve(ax, t, np.where(np.isfinite(measured), measured, np.nan), color=MEASURED,
                       linewidth=0.7, label="measured")
-    shown = recording.true(signal)
-    drawing.curve(ax, t, shown, color=colour, label=None if shown is measured else "true")
+    drawing.curve(ax, t, shown, color=colour, label="true" if apart else None)
     tip = signal == "ee_distance"
     if tip:
         _in_red(ax, t, shown, recording["repulsion_active"])
