@@ -58,9 +58,10 @@ hand.set_target_from_configuration(arm)
 mink.solve_ik(arm, [hand], 0.01, "daqp")""",
 }
 _TICK = """\
+from scenarios.cell.build import build
 from scenarios.config import load
 from scenarios.loop.controller import Controller
-controller = Controller(load("ellipse"))
+controller = Controller(build(load("ellipse")))
 plant = controller.cell.plant
 controller.command(0.0, plant.q, plant.v)"""
 _COMMAND = """\

@@ -11,6 +11,7 @@ import numpy as np
 
 from hierarchy.problem import Array
 from scenarios import load
+from scenarios.cell.build import build
 from scenarios.loop.controller import Controller
 from scenarios.loop.simulation import uninterrupted
 
@@ -39,7 +40,7 @@ def differences(name: str) -> Array:
     The state is that of the tick before a row, whose command was recorded: one integration undone.
     """
     expected, scenario = reference(name), load(RUNS[name][0])
-    T, controller, found = scenario.control.period, Controller(scenario), []
+    T, controller, found = scenario.control.period, Controller(build(scenario)), []
     for k in range(1, len(expected["t"])):
         a = expected["a_previous"][k]
         v = expected["v"][k] - a * T

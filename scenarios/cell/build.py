@@ -42,7 +42,7 @@ Order = Callable[[Measurement | None, float], Allocation]
 
 @dataclass(frozen=True)
 class Cell:
-    """Everything the control loop needs: robot, start, tasks and sensor.
+    """Everything the control loop needs: robot, start, tasks, sensor and resolver.
 
     `start` is q (nq,) and v (n,). `order` selects the tasks in the stack from the measurement and
     the cone error cos(alpha_d) - cos(alpha), one of `orders`. `activation` is that of the stack's
@@ -60,6 +60,7 @@ class Cell:
     stack: Stack
     order: Order
     orders: Collection[tuple[str, ...]]
+    resolver: Resolver
     activation: Activation | None = None
     contacts: Contacts | None = None
 
@@ -81,7 +82,7 @@ class Cell:
 
 
 def build(scenario: Scenario, kept: Cell | None = None) -> Cell:
-    """Build the parts; raises HierarchyError if the scenario does not fit its robot.
+    """Build the parts; raises HierarchyError if the scenario does not fit its robot or resolver.
 
     `kept` is the cell of a scenario that differs only in its resolver or task settings: its robot,
     start, state, plant and obstacles are reused, and its sensor if the sensor settings are equal.
@@ -108,7 +109,8 @@ def build(scenario: Scenario, kept: Cell | None = None) -> Cell:
     stack = Stack(rows, scenario.control.level, tasks.reference, at.contacts,
                   "mass" if scenario.control.metric == "mass" else None, tasks.give)
     return Cell(scenario, at.robot, (at.start.q, at.start.v), state, plant, sensor, tasks, stack,
-                *_order(scenario, tasks), activation, at.contacts)
+                *_order(scenario, tasks), _resolver(scenario, at.robot, stack, activation),
+                activation, at.contacts)
 
 
 def _order(scenario: Scenario, tasks: Tasks) -> tuple[Order, Collection[tuple[str, ...]]]:
@@ -161,14 +163,14 @@ def _rows(scenario: Scenario, tasks: Sequence[Task],
     return found, Activation(state, found, buffers)
 
 
-def stack_resolver(scenario: Scenario, cell: Cell) -> Resolver:
-    """Return the scenario's resolver, as the stack of its cell uses it.
+def _resolver(scenario: Scenario, robot: Robot, stack: Stack,
+              activation: Activation | None) -> Resolver:
+    """Return the scenario's resolver, as its stack uses it.
 
     Raises ScenarioError if the stack has activations and the resolver does not take them, or lacks
     a level that has a scale.
     """
     resolver, control = scenario.make_resolver(), scenario.control
-    robot, stack, activation = cell.robot, cell.stack, cell.activation
     if isinstance(resolver, Merged):
         scales, given = {name: stack[name].scale for name in stack.names}, dict(resolver.scales)
         with naming("control.options.scales"):

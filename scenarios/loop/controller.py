@@ -1,5 +1,6 @@
 """One tick of control: from a measured joint state to a command."""
 
+from collections.abc import Callable
 from math import inf, nan
 from time import perf_counter
 from typing import Any
@@ -9,9 +10,7 @@ import numpy as np
 from hierarchy.allocation import Allocation
 from hierarchy.jit import bind
 from hierarchy.problem import Array, Hierarchy
-from scenarios.cell.build import Cell, build, stack_resolver
-from scenarios.config import Scenario
-from scenarios.loop.faults import Faults
+from scenarios.cell.build import Cell
 from scenarios.loop.policy import policy_of, smallest
 from scenarios.loop.transition import Blend
 from solvers import Resolution, Status
@@ -34,13 +33,9 @@ class Controller:
 
     hierarchy: Hierarchy
 
-    def __init__(self, scenario: Scenario, cell: Cell | None = None,
-                 faults: Faults | None = None) -> None:
-        cell = build(scenario) if cell is None else cell
-        resolver, self.clock = stack_resolver(scenario, cell), perf_counter
-        if faults is not None:
-            cell, resolver, self.clock = faults.around(cell, resolver)
-        self.cell, self.resolver, control = cell, resolver, scenario.control
+    def __init__(self, cell: Cell, clock: Callable[[], float] = perf_counter) -> None:
+        self.cell, self.resolver, self.clock = cell, cell.resolver, clock
+        control = cell.scenario.control
         self.level, self.policy = control.level, policy_of(cell, control)
         self.blend = Blend(control.transition_time) if control.transition == "blend" else None
         self.cone_error = nan

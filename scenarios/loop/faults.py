@@ -1,6 +1,6 @@
 """Injected faults, placed between plant, sensor, resolver and controller."""
 
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
 from time import perf_counter
 from typing import Any, ClassVar, final
@@ -17,19 +17,18 @@ from scenarios.cell.sensors import DepthSensor, Sensor
 from scenarios.config import Scenario, ScenarioError
 from scenarios.config.sections.avoidance import ObstacleSection
 from scenarios.config.sections.control import FaultSection
-from solvers import Resolution, Resolver, Status
+from solvers import Resolution, Status
 from solvers.resolver import Around, Handles
-
-Clock = Callable[[], float]
 
 _AWAY = (1e3, 1e3, 1e3)  # [m] where an obstacle is until its fault starts
 
 
 @final
 class Faults:
-    """The faults of a scenario, put `around` the cell and the resolver of its controller.
+    """The faults of a scenario, put `around` the cell of its controller.
 
-    Call `measure` once before each command, in order of time.
+    Call `measure` once before each command, in order of time. `clock` [s] is that of the
+    controller, which faults may advance.
     """
 
     def __init__(self, scenario: Scenario) -> None:
@@ -38,19 +37,21 @@ class Faults:
         self._skipped, self._skipped_at = 0.0, -1.0
         self._standing: set[int] = set()
 
-    def around(self, cell: Cell, resolver: Resolver) -> tuple[Cell, Resolver, Clock]:
-        """Return a cell, a resolver and a clock [s] with these faults, which may advance it.
+    def around(self, cell: Cell) -> Cell:
+        """Return a cell, that of the scenario `with_room`, with these faults.
 
-        The cell is that of the scenario `with_room`. Raises ScenarioError where a fault does not
-        fit the robot.
+        Raises ScenarioError where a fault does not fit the robot.
         """
         check(self._sections, cell.robot)
         if cell.sensor is not None:
             cell = replace(cell, sensor=FaultySensor(cell.sensor, self))
         self._plant, self._robot, self._sensor = cell.plant, cell.robot, cell.sensor
         self._last = cell.plant.q.copy(), cell.plant.v.copy(), 0.0
-        return (cell, _FaultyResolver(inner=resolver, faults=self),
-                lambda: perf_counter() + self._skipped)
+        return replace(cell, resolver=_FaultyResolver(inner=cell.resolver, faults=self))
+
+    def clock(self) -> float:
+        """Return the time [s], with what ticks took longer."""
+        return perf_counter() + self._skipped
 
     def measure(self, t: float) -> tuple[Array, Array, float]:
         """Return q (nq,) and v (n,) as measured at time t [s], and when that was [s]."""

@@ -9,7 +9,7 @@ import numpy as np
 from hierarchy.tasks.pairs import inseparable_pairs
 from hierarchy.tasks.separation import SelfSeparation
 from hierarchy.words import listed
-from scenarios.cell.build import Cell
+from scenarios.cell.build import Cell, build
 from scenarios.config import Scenario, ScenarioError
 from scenarios.config.sampling import changed, drawn
 from scenarios.config.validation import doubtful_units
@@ -77,7 +77,7 @@ def contact_warnings(scenario: Scenario) -> tuple[str, ...]:
 def _after_one(scenario: Scenario) -> Controller:
     """Return a controller after its first tick."""
     with blaming():
-        controller = Controller(scenario)
+        controller = Controller(build(scenario))
         check(scenario.faults, controller.cell.robot)
         plant = controller.cell.plant
         controller.command(0.0, plant.q, plant.v)

@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 
 from hierarchy.errors import HierarchyError, brief, expect
-from scenarios.cell.build import Cell
+from scenarios.cell.build import Cell, build
 from scenarios.config import Scenario, load
 from scenarios.loop.audit import Audit, Strictness, certify_tick
 from scenarios.loop.controller import Controller
@@ -41,7 +41,8 @@ def simulate(scenario: Scenario | str | Path, progress: Callable[[int, int], Non
     expect("simulate: audits", audits, Iterable, "give a list of audits")
     rehearsal = rehearsed(scenario)
     faults = Faults(scenario) if scenario.faults else None
-    controller = Controller(with_room(scenario) if faults else scenario, faults=faults)
+    controller = Controller(faults.around(build(with_room(scenario))), faults.clock) \
+        if faults else Controller(build(scenario))
     ticks = scenario.control.ticks
     recorder, fates = watching(controller, ticks, certified, audits)
     try:
@@ -81,7 +82,7 @@ def rehearsed(scenario: Scenario) -> Cell:
     Raises HierarchyError where the scenario does not fit its robot or resolver.
     """
     with blaming():
-        controller = Controller(scenario)
+        controller = Controller(build(scenario))
         controller.rehearse()
         Recorder(controller, 1).write()
     return controller.cell

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from hierarchy.errors import HierarchyError, refuse, whole
 from hierarchy.problem import Array, Hierarchy
-from scenarios.cell.build import Cell, build, stack_resolver
+from scenarios.cell.build import Cell, build
 from scenarios.measure.causes import Cause, Solve, Tick, causes
 from scenarios.measure.judging import Rows
 from scenarios.measure.metric import shown
@@ -77,9 +77,8 @@ def jumps(recording: Recording, tick: int | None = None, least: float = 0.0) -> 
 def _solves(recording: Recording, cell: Cell, rows: Rows, ticks: Sequence[int]
             ) -> dict[int, Solve]:
     """Return what answers as in each of these ticks; what `merged` carries comes from a replay."""
-    resolver = stack_resolver(recording.scenario, cell)
+    resolver, memory = cell.resolver, None
     carried: dict[int, Any] = {}
-    memory = None
 
     def answer(memory: Any, h: Hierarchy) -> Array:
         return resolver.solve(h, memory).x

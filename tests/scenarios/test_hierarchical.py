@@ -85,7 +85,7 @@ def distances(cell):
 def near_obstacles(name, *changes):
     """A controller that has commanded at random joint positions with a point nearer than 0.1 m."""
     for q, _ in states(60, seed=5):
-        controller = Controller(load(name, changes))
+        controller = Controller(build(load(name, changes)))
         controller.command(0.0, q, np.zeros(7))
         if 0.0 < distances(controller.cell).min() < 0.1:
             yield controller

@@ -9,6 +9,7 @@ from scene import FRAME, ROBOT, place_of
 from hierarchy import Hierarchy, State
 from hierarchy.avoidance import Obstacles
 from scenarios import load, simulate
+from scenarios.cell.build import build
 from scenarios.cell.plants import Apart, JointSensor, KinematicArm, PhysicsArm
 from scenarios.config.sections.plant import MeasurementSection, PhysicsSection
 from scenarios.loop.audit import ActiveSets
@@ -106,7 +107,7 @@ def test_the_controller_sees_what_is_measured_and_nothing_else(mujoco, changes):
     run = simulate(load("ellipse", changes))
     assert np.std(run["q"] - run["true_q"]) == pytest.approx(1e-4, rel=0.1)
     assert np.std(run["v"] - run["true_v"]) == pytest.approx(1e-2, rel=0.1)
-    controller = Controller(load("ellipse", SHORT))  # a plant of its own that nobody moves
+    controller = Controller(build(load("ellipse", SHORT)))  # a plant of its own that nobody moves
     for k in range(run.ticks):
         command = controller.command(run["t"][k], run["q"][k], run["v"][k])
         np.testing.assert_array_equal(command, run["command"][k])

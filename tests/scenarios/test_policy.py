@@ -80,7 +80,7 @@ def test_braking_ends_at_rest_and_never_swings_through_it(period):
 
 
 def controller(*changes, name="ellipse"):
-    made = Controller(load(name, changes))
+    made = Controller(build(load(name, changes)))
     return made, made.cell.plant.q.copy(), made.cell.plant.v.copy()
 
 
@@ -237,7 +237,7 @@ FAULTS = {
 def test_a_fault_of_a_joint_spoils_its_number_alone(name, fault, joint, spoiled):
     scenario = load(name, [f"faults=[{{kind='{fault}', at=0.0, duration=0.1, joint={joint}}}]"])
     faults = Faults(scenario)
-    faults.around(build(scenario), make("tpm"))
+    faults.around(build(scenario))
     measured = faults.measure(0.0)[fault == "nan_velocity"]
     assert np.flatnonzero(np.isnan(measured)).tolist() == [spoiled]
 

@@ -81,7 +81,7 @@ def recording():
 def test_violations_are_those_of_the_hierarchy_that_was_resolved(name):
     """A second run asks the loop's own hierarchy, tick by tick, what its command violates."""
     scenario = load(name, ["control.duration=0.2", "start.v=[0.1, -0.1, 0, 0.2, 0, 0.1, 0]"])
-    controller = Controller(scenario)
+    controller = Controller(build(scenario))
     plant, seen = controller.cell.plant, []
     for k in range(200):
         x = controller.command(k * scenario.control.period, plant.q, plant.v)

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from scenarios import load, shipped, simulate
+from scenarios.cell.build import build
 from scenarios.loop.controller import Controller
 from scenarios.loop.recorder import Recorder
 from scenarios.loop.simulation import tick
@@ -44,7 +45,7 @@ class Failing:
 
 def test_an_inaccurate_answer_is_used_within_the_torque_step():
     scenario = SHORT.with_changes({"limits.torque_step": 0.3, "control.policy.inaccurate": "use"})
-    controller = Controller(scenario)
+    controller = Controller(build(scenario))
     controller.resolver, recorder = Failing(Status.INACCURATE, 8), Recorder(controller, 10)
     for k in range(10):
         assert tick(controller, recorder, k * 1e-3) is None
@@ -56,7 +57,7 @@ def test_an_inaccurate_answer_is_used_within_the_torque_step():
 @pytest.mark.parametrize("action", ["hold", "brake"])
 def test_without_an_answer_the_last_torques_are_held_or_joints_slowed_down(action):
     scenario = SHORT.with_changes({"control.policy.backend_failure": action})
-    controller = Controller(scenario)
+    controller = Controller(build(scenario))
     controller.resolver = Failing(Status.BACKEND_FAILURE, 8)
     recorder = Recorder(controller, 10)
     for k in range(10):

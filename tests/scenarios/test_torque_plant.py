@@ -261,7 +261,7 @@ def doubts(scenario, change):
     """What a first tick says of a robot with contacts whose run may fall, or prove nothing."""
     cell = build(scenario)
     change(cell.robot)
-    controller = Controller(scenario, cell)
+    controller = Controller(cell)
     controller.command(0.0, cell.plant.q, cell.plant.v)
     return list(footing(controller))
 
@@ -302,7 +302,7 @@ def test_without_gravity_nothing_has_to_stand():
 def test_a_robot_that_is_put_on_the_floor_is_carried_from_the_first_tick_on():
     """Rounding decided: the quadruped's knees were at 2.2 rad/s before a contact carried."""
     cell = build(load("crawl"))
-    controller = Controller(cell.scenario, cell)
+    controller = Controller(cell)
     cell.plant.act(controller.command(0.0, cell.plant.q, cell.plant.v))
     assert cell.plant.extra["floor_force"][:, 2].min() > 1.0
     assert np.abs(cell.plant.v[6:]).max() < 0.2

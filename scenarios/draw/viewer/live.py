@@ -46,7 +46,7 @@ class Live:
         control = self.scenario.control
         self.begun, self.over = self.scenario, False
         self.fault: str | None = None
-        self.controller = Controller(self.scenario)
+        self.controller = Controller(build(self.scenario))
         self.ticks = control.ticks
         self.recorder, self._fates = watching(self.controller, self.ticks)
         self.changes: list[dict[str, Any]] = []
@@ -151,7 +151,7 @@ class Live:
         before = self.controller.cell
         measurement = before.state.measurement
         try:
-            controller = Controller(scenario, build(scenario, before))
+            controller = Controller(build(scenario, before))
         except HierarchyError:
             before.state.measurement = measurement
             raise
