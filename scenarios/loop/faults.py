@@ -25,29 +25,22 @@ _AWAY = (1e3, 1e3, 1e3)  # [m] where an obstacle is until its fault starts
 
 @final
 class Faults:
-    """The faults of a scenario, put `around` the cell of its controller.
+    """The faults of a scenario around its cell, which is that of the scenario `with_room`.
 
-    Call `measure` once before each command, in order of time. `clock` [s] is that of the
-    controller, which faults may advance.
+    `cell` has them, and `clock` [s], which they may advance, is that of its controller. Call
+    `measure` once before each command, in order of time. Raises ScenarioError where a fault does
+    not fit the robot.
     """
 
-    def __init__(self, scenario: Scenario) -> None:
-        self._sections, self._now = scenario.faults, 0.0
-        self._period = scenario.control.period
+    def __init__(self, cell: Cell) -> None:
+        self._sections, self._now = cell.scenario.faults, 0.0
+        self._period = cell.scenario.control.period
         self._skipped, self._skipped_at = 0.0, -1.0
         self._standing: set[int] = set()
-
-    def around(self, cell: Cell) -> Cell:
-        """Return a cell, that of the scenario `with_room`, with these faults.
-
-        Raises ScenarioError where a fault does not fit the robot.
-        """
         check(self._sections, cell.robot)
-        if cell.sensor is not None:
-            cell = replace(cell, sensor=FaultySensor(cell.sensor, self))
-        self._plant, self._robot, self._sensor = cell.plant, cell.robot, cell.sensor
         self._last = cell.plant.q.copy(), cell.plant.v.copy(), 0.0
-        return replace(cell, resolver=_FaultyResolver(inner=cell.resolver, faults=self))
+        self.cell = replace(cell, resolver=_FaultyResolver(inner=cell.resolver, faults=self),
+                            sensor=cell.sensor and FaultySensor(cell.sensor, self))
 
     def clock(self) -> float:
         """Return the time [s], with what ticks took longer."""
@@ -58,9 +51,8 @@ class Faults:
         self._now = t
         self._place_obstacles()
         if not any(self.now("stale")):
-            q, v = self._plant.q.copy(), self._plant.v.copy()
-            base = self._robot.actuated
-            positions = self._robot.coordinates[base:] + 1
+            q, v, robot = self.cell.plant.q.copy(), self.cell.plant.v.copy(), self.cell.robot
+            base, positions = robot.actuated, robot.coordinates[robot.actuated:] + 1
             _spoil(q, [int(positions[fault.joint - 1]) if fault.joint else None
                        for fault in self.now("nan_position")])
             _spoil(v, [base + fault.joint if fault.joint else None
@@ -91,11 +83,11 @@ class Faults:
                 if i not in self._standing:
                     centre[:] = _AWAY
                 elif fault.place is not None:
-                    point = point_of(self._robot, fault.place, "place")
-                    centre = State.at(self._robot, self._plant.q).position(
+                    point = point_of(self.cell.robot, fault.place, "place")
+                    centre = State.at(self.cell.robot, self.cell.plant.q).position(
                         Frame("", point.joint, np.array(point.offset), np.eye(3)))
-                assert self._sensor is not None
-                self._sensor.obstacles.centres[i] = centre
+                assert self.cell.sensor is not None
+                self.cell.sensor.obstacles.centres[i] = centre
 
 
 class FaultySensor:

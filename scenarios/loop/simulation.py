@@ -40,9 +40,9 @@ def simulate(scenario: Scenario | str | Path, progress: Callable[[int, int], Non
         raise HierarchyError(f"simulate: progress: expected a function, got {brief(progress)}")
     expect("simulate: audits", audits, Iterable, "give a list of audits")
     rehearsal = rehearsed(scenario)
-    faults = Faults(scenario) if scenario.faults else None
-    controller = Controller(faults.around(build(with_room(scenario))), faults.clock) \
-        if faults else Controller(build(scenario))
+    cell = build(with_room(scenario))
+    faults = Faults(cell) if scenario.faults else None
+    controller = Controller(faults.cell, faults.clock) if faults else Controller(cell)
     ticks = scenario.control.ticks
     recorder, fates = watching(controller, ticks, certified, audits)
     try:

@@ -236,9 +236,7 @@ FAULTS = {
     ("humanoid", "nan_position", 2, 8), ("humanoid", "nan_velocity", 2, 7)])
 def test_a_fault_of_a_joint_spoils_its_number_alone(name, fault, joint, spoiled):
     scenario = load(name, [f"faults=[{{kind='{fault}', at=0.0, duration=0.1, joint={joint}}}]"])
-    faults = Faults(scenario)
-    faults.around(build(scenario))
-    measured = faults.measure(0.0)[fault == "nan_velocity"]
+    measured = Faults(build(scenario)).measure(0.0)[fault == "nan_velocity"]
     assert np.flatnonzero(np.isnan(measured)).tolist() == [spoiled]
 
 
