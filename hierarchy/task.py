@@ -19,7 +19,7 @@ from hierarchy.errors import HierarchyError, brief, check_choice, expect, refuse
 from hierarchy.gate import check_rows, shaped
 from hierarchy.paths import Path
 from hierarchy.problem import Array
-from hierarchy.records import NUMBERS, Check, check_fields, equal
+from hierarchy.records import PLAIN, Check, check_fields, equal
 from hierarchy.robot import Frame, Robot
 from hierarchy.state import State
 
@@ -48,7 +48,7 @@ def _made(kind: type, remedy: str) -> Check:
 
 
 _PARTS: dict[Any, Check] = {  # of a task, by the type of the field
-    **NUMBERS, Sequence[ControlPoint]: lambda what, value: refuse(
+    **PLAIN, Sequence[ControlPoint]: lambda what, value: refuse(
         not len(pack_points(value).joints), f"{what}: expected at least one control point"),
     Robot: _made(Robot, "Robot.load(NAME)"), Frame: _made(Frame, "robot.frame(NAME)"),
     Path: _made(Path, "a path of hierarchy.paths, such as Still([x, y, z])"),
