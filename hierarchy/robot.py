@@ -32,7 +32,7 @@ from hierarchy.errors import (
     text,
     whole,
 )
-from hierarchy.gate import array_of, check_rotation, shaped
+from hierarchy.gate import check_rotation, shaped
 from hierarchy.problem import Array
 from hierarchy.records import equal, set_frozen
 from hierarchy.robots import TABLES
@@ -82,11 +82,10 @@ class Frame:
 
     def __post_init__(self) -> None:
         what = f"frame {self.name!r}"
-        check_rotation(f"{what}: rotation", self.rotation)
+        rotation = check_rotation(f"{what}: rotation", self.rotation)
         expect(f"{what}: of", self.of, str, "give the name of a joint")
-        set_frozen(self, joint=whole(f"{what}: joint", self.joint),
-                   offset=finite_numbers(f"{what}: offset", self.offset, 3),
-                   rotation=array_of(f"{what}: rotation", self.rotation))
+        set_frozen(self, joint=whole(f"{what}: joint", self.joint), rotation=rotation,
+                   offset=finite_numbers(f"{what}: offset", self.offset, 3))
 
     def placed(self, point: ArrayLike) -> Array:
         """Return a point (3,) [m] of the frame as the joint's frame has it."""
