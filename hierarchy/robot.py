@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from functools import cached_property
+from functools import cached_property, partial
 from operator import attrgetter
 from os import PathLike
 from pathlib import Path
-from typing import Any, get_args
+from typing import Annotated, Any, get_args
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -30,11 +30,10 @@ from hierarchy.errors import (
     of_user,
     refuse,
     text,
-    whole,
 )
 from hierarchy.gate import check_rotation, shaped
 from hierarchy.problem import Array
-from hierarchy.records import equal, set_frozen
+from hierarchy.records import check_fields, equal
 from hierarchy.robots import TABLES
 from hierarchy.robots.files import read_file
 from hierarchy.robots.found import (
@@ -75,17 +74,13 @@ class Frame:
 
     name: str
     joint: int
-    offset: Array
-    rotation: Array
+    offset: Annotated[Array, partial(finite_numbers, size=3)]
+    rotation: Annotated[Array, check_rotation]
     of: str = field(default="", repr=False, compare=False)
     __eq__ = equal
 
     def __post_init__(self) -> None:
-        what = f"frame {self.name!r}"
-        rotation = check_rotation(f"{what}: rotation", self.rotation)
-        expect(f"{what}: of", self.of, str, "give the name of a joint")
-        set_frozen(self, joint=whole(f"{what}: joint", self.joint), rotation=rotation,
-                   offset=finite_numbers(f"{what}: offset", self.offset, 3))
+        check_fields(self, f"frame {self.name!r}")
 
     def placed(self, point: ArrayLike) -> Array:
         """Return a point (3,) [m] of the frame as the joint's frame has it."""

@@ -70,6 +70,7 @@ class Pose(Measured):
     damping: float = 20.0
     gain: float = 10.0
     name: str = "pose"
+    dimension = 6
     row_names = ("x", "y", "z", "about x", "about y", "about z")
 
     def measure(self, state: State) -> Measure:
@@ -91,6 +92,7 @@ class Orientation(Measured):
     damping: float = 20.0
     gain: float = 10.0
     name: str = "orientation"
+    dimension = 3
     row_names = Pose.row_names[3:]
 
     def measure(self, state: State) -> Measure:

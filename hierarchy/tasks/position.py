@@ -48,6 +48,7 @@ class Position(Measured):
     gain: float = 10.0
     repulsion_within: float = -1.0
     name: str = "position"
+    dimension = 3
     row_names = ("x", "y", "z")
 
     def measure(self, state: State) -> Measure:
