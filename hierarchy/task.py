@@ -349,11 +349,10 @@ class Written(Task):
     def rows(self, state: State, level: Level = "velocity") -> Rows:
         """The rows at a state; of forces, see `ForceTask`."""
         check_choice(f"task {self.name!r}: level", level, get_args(Level))
-        columns = state.n
+        contacts = self.contacts if self.of_forces else None
         if self.of_forces:
-            level = "acceleration" if self.contacts is None else "torque"
-            columns = columns if self.contacts is None else self.contacts.unknowns
-        rows = Rows.empty(self.dimension, columns)
+            level = "acceleration" if contacts is None else "torque"
+        rows = Rows.empty(self.dimension, state.n if contacts is None else contacts.unknowns)
         self.writer(state, level, rows)()
         return rows
 
