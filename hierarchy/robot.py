@@ -217,9 +217,10 @@ class Robot:
         """
         expect("Robot.named: name", name, str, "give a name of ROBOTS")
         _check_base(name, base)
-        found = plugins.find("robots", name)
+        found = TABLES.get(name) or plugins.find("robots", name)  # a user adds to ROBOTS too
         if found is None:
-            raise UnknownNameError("robot", name, plugins.known("robots"), elsewhere(name))
+            known = {*TABLES, *plugins.own("robots")}
+            raise UnknownNameError("robot", name, known, elsewhere(name))
         with of_user(f"robot {name!r} of a plugin"):
             made = found if isinstance(found, Table | str | Path | cls) else found()
         if isinstance(made, str | Path):
