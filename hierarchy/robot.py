@@ -126,14 +126,13 @@ class Robot:
     rad/s]; `actuated` is the index of the first actuated velocity: 6 or 0. `lower`, `upper` (nq,)
     [rad or m], `velocity_limit` (n,) [rad/s or m/s] and `effort_limit` (n,) [N m or N] are infinite
     where the model has none, but for the speed of the base, see `limit_base`. `coordinates` (n,) is
-    the index in q of the (first) position of each velocity, `velocity_units` (n) the unit of that,
-    "rad" or "m"; `velocity_names` (n) and `coordinate_names` (nq) are those of joints, numbered
-    where one has several. `parents`, `masses` [kg] and `centres` (joints + 1, 3) [m] have the joint
-    that carries each joint, and the body that it moves. `rest` (nq,) is the default initial
-    configuration. `missing` has sentences about what the file does not give, or gives and the robot
-    is without; `coupled` joints follow another one in the file, `loops` are chains that it closes,
-    `starts` the configurations (nq,) that it names, `apart` pairs of joints whose bodies it lets
-    touch. `table` is the table that the robot was made from, or None.
+    the index in q of the (first) position of each velocity, `velocity_units` (n) its unit, "rad" or
+    "m"; `velocity_names` (n) and `coordinate_names` (nq) name joints, numbered where one has
+    several. `parents`, `masses` [kg] and `centres` (joints + 1, 3) [m] have the joint that carries
+    each joint, and the body that it moves. `rest` (nq,) is the default start. `missing` says what
+    the file lacks, or has and the robot is without; `coupled` joints follow another one in the
+    file, `loops` are chains that it closes, `starts` the configurations (nq,) that it names,
+    `apart` pairs of joints whose bodies it lets touch. `table` is what it was made from, or None.
     """
 
     lower: Array = _sized("lower", "nq")
