@@ -29,8 +29,8 @@ def array_of(what: str, value: Any) -> Array:
     raise HierarchyError(f"{what} is not an array of {kind} {brief(value)}")
 
 
-def check_rotation(what: str, rotation: ArrayLike) -> None:
-    """Raise a HierarchyError, with how far it is off, unless a matrix (3, 3) is a rotation."""
+def check_rotation(what: str, rotation: ArrayLike) -> Array:
+    """Return a rotation (3, 3) as a new array; HierarchyError, with how far it is off, for none."""
     try:
         R = array_of(what, rotation)
     except HierarchyError:
@@ -38,14 +38,13 @@ def check_rotation(what: str, rotation: ArrayLike) -> None:
     if R.shape != (3, 3) or not np.isfinite(R).all():
         raise HierarchyError(f"{what}: expected a rotation matrix (3, 3), got {brief(rotation)}")
     off = float(np.abs(R @ R.T - np.eye(3)).max())
-    if off > _TURNED:
+    if off > _TURNED or np.linalg.det(R) < 0.0:
         rounded = ": write it with 8 digits" if off < _ROUNDED else ""
-        raise HierarchyError(f"{what}: expected a rotation matrix (3, 3), but R R^T is "
-                             f"{off:.2g} from the identity, at most {_TURNED:g} is allowed"
-                             f"{rounded}; got {brief(R.tolist())}")
-    if np.linalg.det(R) < 0.0:
-        raise HierarchyError(f"{what}: expected a rotation matrix (3, 3), but it is a "
-                             f"reflection, of determinant -1; got {brief(R.tolist())}")
+        why = (f"R R^T is {off:.2g} from the identity, at most {_TURNED:g} is allowed{rounded}"
+               if off > _TURNED else "it is a reflection, of determinant -1")
+        raise HierarchyError(f"{what}: expected a rotation matrix (3, 3), but {why}; got "
+                             f"{brief(R.tolist())}")
+    return R
 
 
 Rotation = Annotated[ArrayLike, check_rotation]  # (3, 3), of a field; see `records`
@@ -162,14 +161,14 @@ def check_finite(what: str, values: Array) -> None:
         raise HierarchyError(f"{what}, entry {i}: {values[i]} is not finite")
 
 
-def checked_metric(metric: ArrayLike, n: int | None = None) -> Array:
-    """Return a metric (n, n), n being any number if None.
+def checked_metric(metric: ArrayLike) -> Array:
+    """Return a metric (n, n), n being any number.
 
     Raises HierarchyError if it has another shape, an entry that is not finite, or is not symmetric
     or not positive definite, up to rounding.
     """
     W = array_of("metric", metric)
-    size = W.shape[0] if n is None and W.ndim else n or 0
+    size = len(W) if W.ndim else 0
     W = shaped("metric", W, (size, size))
     for i, j in np.argwhere(~np.isfinite(W))[:1]:
         raise HierarchyError(f"metric[{i}, {j}] is {W[i, j]}")

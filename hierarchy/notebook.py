@@ -16,23 +16,17 @@ _ENTRIES = 8    # entries of an array that are shown
 def html_table(caption: str, head: Sequence[object], rows: Sequence[Sequence[object]],
                best: Collection[tuple[int, int]] = ()) -> str:
     """Return an HTML table with at most 30 rows; cells at the (row, column) of `best` are bold."""
-    shown = []
+    lines = [[f"<th>{escape(str(name))}</th>" for name in head]] if head else []
     for i, row in enumerate(rows[:_MOST]):
-        texts = [escape(str(value)) for value in row]
-        shown.append(_row([f"<td><b>{text}</b></td>" if (i, j) in best else f"<td>{text}</td>"
-                           for j, text in enumerate(texts)]))
-    left = len(rows) - _MOST
-    if left > 0:
-        shown.append(_row([f'<td colspan="{max(1, len(head))}">... and {left} more</td>']))
-    top = _row([f"<th>{escape(str(name))}</th>" for name in head]) if head else ""
-    return f"<table><caption>{escape(caption)}</caption>{top}{''.join(shown)}</table>"
+        lines.append([f"<td><b>{text}</b></td>" if (i, j) in best else f"<td>{text}</td>"
+                      for j, text in enumerate(escape(str(value)) for value in row)])
+    if (left := len(rows) - _MOST) > 0:
+        lines.append([f'<td colspan="{max(1, len(head))}">... and {left} more</td>'])
+    shown = "".join(f"<tr>{''.join(cells)}</tr>" for cells in lines)
+    return f"<table><caption>{escape(caption)}</caption>{shown}</table>"
 
 
 def numbers(values: NDArray[np.float64]) -> str:
     """Return an array in one line with four digits, without the middle where it is long."""
     return np.array2string(np.asarray(values), precision=4, threshold=_ENTRIES, edgeitems=3,
                            suppress_small=True, max_line_width=1000)
-
-
-def _row(cells: Sequence[str]) -> str:
-    return f"<tr>{''.join(cells)}</tr>"

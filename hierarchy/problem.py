@@ -188,7 +188,7 @@ class Hierarchy:
                 gate.check_rows(name, *level)
         gate.check_finite("reference", self.reference)
         if self.metric is not None:
-            gate.checked_metric(self.metric, self.n)
+            gate.checked_metric(self.metric)
         if self.give is not None:
             for name, (first, last) in zip(self.names, self._bounds(), strict=True):
                 gate.checked_give(name, self.give[first:last], last - first)

@@ -15,15 +15,17 @@ from types import NoneType, SimpleNamespace
 from typing import Annotated, Any, Literal, get_args, get_origin, get_type_hints
 
 import numpy as np
+from numpy.typing import NDArray
 
-from hierarchy.errors import check_choice, finite_numbers, number, positive, real, whole
+from hierarchy.errors import check_choice, finite_numbers, number, positive, real, text, whole
 
 Check = Callable[[str, Any], Any]
 Positive = Annotated[float, positive]
 NotNegative = Annotated[float, partial(number, least=0.0)]
 Vector3 = Annotated[Sequence[float], partial(finite_numbers, size=3)]
-NUMBERS: dict[Any, Check] = {float: real, int: whole}
-_Asked = tuple[str, str, bool, Check, bool]  # name, also with unit, may be None, check, a number
+PLAIN: dict[Any, Check] = {float: real, int: whole, str: text}
+_KEPT = (float, int, NDArray[np.float64])  # types of which what the check returns is kept
+_Asked = tuple[str, str, bool, Check, bool]  # name, also with unit, may be None, check, is kept
 _known: dict[type, list[_Asked]] = {}  # what is asked of the fields of each class
 
 
@@ -34,20 +36,21 @@ def set_frozen(record: object, **values: object) -> None:
         put(record, name, value)
 
 
-def check_fields(record: object, what: str, plain: Mapping[Any, Check] = NUMBERS,
+def check_fields(record: object, what: str, plain: Mapping[Any, Check] = PLAIN,
                  free: Collection[str] = ()) -> None:
-    """Raise a HierarchyError for a field that is not what its type asks for; make numbers floats.
+    """Raise a HierarchyError for a field that is not what its type asks for; keep numbers, arrays.
 
-    plain : checks of types that are not Annotated. free : names of fields that need none of these.
+    They are as the check returns them: floats, copies of arrays. plain : checks of types that are
+    not Annotated. free : names of fields that need none of these.
     """
     kind = type(record)
     if kind not in _known:
         _known[kind] = list(_asked(kind, plain, free))
-    for name, said, optional, check, is_number in _known[kind]:
+    for name, said, optional, check, is_kept in _known[kind]:
         value = getattr(record, name, None)
         if value is not None or not optional:
             found = check(f"{what}: {said}", value)
-            if is_number:
+            if is_kept:
                 object.__setattr__(record, name, found)
 
 
@@ -67,7 +70,7 @@ def _asked(kind: Any, plain: Mapping[Any, Check], free: Collection[str]) -> Iter
             check = partial(check_choice, known=get_args(own))
         if check is not None:
             said = "".join((field.name, *(f" [{one}]" for one in unit)))
-            yield field.name, said, optional, check, own in NUMBERS
+            yield field.name, said, optional, check, own in _KEPT
 
 
 def _hint(kind: type, field: Field[Any], names: Mapping[str, Any]) -> Any:

@@ -25,7 +25,7 @@ class Motion(NamedTuple):
 
 class _Joint(NamedTuple):
     name: str
-    parent: int | None
+    parent: str
     offset: tuple[float, ...]
     channels: tuple[str, ...]
 
@@ -50,17 +50,17 @@ def read_bvh(file: str | File) -> Motion:
 
 def _skeleton(words: Iterator[str]) -> list[_Joint]:
     joints: list[_Joint] = []
-    open_: list[int] = []
+    open_: list[str] = []
     for word in words:
         if word in ("ROOT", "JOINT", "End"):
-            name, parent = next(words), open_[-1] if open_ else None
+            name, parent = next(words), open_[-1] if open_ else ""
             if word == "End":
-                name = f"{joints[open_[-1]].name} end"
+                name = f"{open_[-1]} end"
             elif name in [joint.name for joint in joints]:
                 raise ValueError(f"joint {name!r} comes twice")
             joints.append(_Joint(name, parent, (0.0, 0.0, 0.0), ()))
         elif word == "{":
-            open_.append(len(joints) - 1)
+            open_.append(joints[-1].name)
         elif word == "}":
             open_.pop()
         elif word == "OFFSET":
@@ -80,7 +80,7 @@ def _positions(joints: list[_Joint], values: Array) -> dict[str, Array]:
     from scipy.spatial.transform import Rotation
 
     frames, first = len(values), 0
-    turns, places = list[Array](), list[Array]()
+    turns, places = dict[str, Array](), dict[str, Array]()
     for joint in joints:
         turn, place = np.tile(np.eye(3), (frames, 1, 1)), np.tile(joint.offset, (frames, 1))
         for channel in joint.channels:
@@ -91,9 +91,8 @@ def _positions(joints: list[_Joint], values: Array) -> dict[str, Array]:
                 about = Rotation.from_euler(channel[0], value[:, None], degrees=True)
                 turn = turn @ about.as_matrix()
             first += 1
-        if joint.parent is not None:
+        if joint.parent:
             place = places[joint.parent] + np.einsum("fij,fj->fi", turns[joint.parent], place)
             turn = turns[joint.parent] @ turn
-        turns.append(turn)
-        places.append(place)
-    return {joint.name: place for joint, place in zip(joints, places, strict=True)}
+        turns[joint.name], places[joint.name] = turn, place
+    return places

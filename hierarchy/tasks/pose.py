@@ -35,7 +35,6 @@ from hierarchy.paths import Path
 from hierarchy.problem import Array
 from hierarchy.robot import Frame
 from hierarchy.state import State
-from hierarchy.task import NamedRows
 
 
 @measured
@@ -186,7 +185,7 @@ def _along(e: Array, rate: Array) -> Array:
 
 
 @dataclass(frozen=True)
-class RelativePose(NamedRows, Measured):
+class RelativePose(Measured):
     """Keep `frame` at `position` (3,) [m] and `rotation` (3, 3) in the axes of the frame `to`.
 
     m = 6, or 3 with `rotation` None: then only the position counts. The orientation error is the

@@ -175,7 +175,7 @@ def limits(**settings):
     (lambda: Robot.from_file(URDF, base="flying"), "iiwa14.urdf': base must be one of"),
     (lambda: Robot.from_file(URDF, None, None, {"j": 0.1}), "shapes: expected a bool, got dict"),
     (lambda: Robot.from_file(URDF, end_effector=B), "unknown end_effector frame array("),
-    (lambda: Frame("tcp", 7, [0, 0, 0.1, 1], A), "'tcp': rotation: expected a rotation matrix"),
+    (lambda: Frame("tcp", 7, [0, 0, 0.1], A), "'tcp': rotation: expected a rotation matrix"),
     (lambda: Frame("tcp", 7, [0, NAN, 0.1], np.eye(3)), "'tcp': offset: expected 3 finite numb"),
     (lambda: Frame("tcp", 1, [0, 0, 0.1], np.eye(3), 1), "'tcp': of: expected a str, got int 1"),
     (lambda: Shifted(None, [0, 0, 0.1]), "shifted: path: expected a Path, got NoneType None"),
