@@ -103,8 +103,8 @@ def pack_capsules(capsules: Sequence[Capsule]) -> tuple[NDArray[np.int64], Array
     return joints, np.array(rows, dtype=float).reshape(len(rows), 7)
 
 
-def measure_capsules(placements: Array, joints: NDArray[np.int64], capsules: Array,
-                     pairs: NDArray[np.int64]) -> Array:
+@compiled
+def measure_capsules(placements, joints, capsules, pairs):
     """Return distance, direction and nearest points of each pair of capsules: (M, 6).
 
     A row is the distance [m], negative where the capsules overlap; the unit vector from the second
@@ -112,17 +112,12 @@ def measure_capsules(placements: Array, joints: NDArray[np.int64], capsules: Arr
     the end. placements as in a State; joints (K,) and capsules (K, 7) packed; pairs (M, 2).
     """
     seen = np.empty((len(pairs), 6))
-    _measure(placements, joints, capsules, pairs, seen)
-    return seen
-
-
-@compiled
-def _measure(placements, joints, capsules, pairs, seen):
-    for m in range(pairs.shape[0]):
+    for m in range(len(pairs)):
         i, j = pairs[m, 0], pairs[m, 1]
         seen[m, 0], r, seen[m, 4], seen[m, 5] = nearest_of_capsules(
             placements[joints[i]], capsules[i], placements[joints[j]], capsules[j])
         seen[m, 1], seen[m, 2], seen[m, 3] = r
+    return seen
 
 
 @inlined
