@@ -74,10 +74,10 @@ class Measured(Task):
 
     @property
     def columns(self) -> NDArray[np.int64]:
-        """The coordinate of the path that each row follows (m,), -1 for a row that follows none."""
-        columns = np.full(self.dimension, -1)
+        """The coordinate of the goal that each row follows (m,), -1 for a row that follows none."""
+        columns = np.arange(self.dimension)
         if self.path is not None:
-            columns[:3] = range(len(columns[:3]))
+            columns[3:] = -1
         return columns
 
     def follow(self, state: State, goal: Array) -> Callable[[float], object] | None:
