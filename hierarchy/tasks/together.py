@@ -1,7 +1,7 @@
 """Tasks that are made of others: several as one level, and the rows of a set-based one."""
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -11,17 +11,7 @@ from hierarchy.problem import Array
 from hierarchy.records import set_frozen
 from hierarchy.robot import Robot
 from hierarchy.state import State
-from hierarchy.task import (
-    Kind,
-    Level,
-    NamedRows,
-    Rows,
-    Task,
-    Writer,
-    Written,
-    in_turn,
-    writer_in_stack,
-)
+from hierarchy.task import Level, NamedRows, Rows, Task, Writer, Written, in_turn, writer_in_stack
 
 
 @dataclass(frozen=True)
@@ -111,8 +101,7 @@ class TangentCone(NamedRows, Written):
     """
 
     task: Task
-    name: str = field(init=False, repr=False, compare=False)
-    kind: Kind = field(init=False, repr=False, compare=False, default="inequality")
+    kind = "inequality"
 
     def __post_init__(self) -> None:
         expect("set-based task", self.task, Task, "see hierarchy.tasks")
@@ -133,10 +122,6 @@ class TangentCone(NamedRows, Written):
         """The rate (m,) at which the bound of `task` moves."""
         return self.task.desired_velocity(state)
 
-    def reference_velocity(self, state: State) -> Array:
-        """The least rate (m,): that of the bound, -inf inside."""
-        return np.where(self.error(state) >= 0.0, self.desired_velocity(state), -np.inf)
-
     def writer(self, state: State, level: Level, rows: Rows) -> Writer:
         """See `Task.writer`."""
         self.refuse(level != "velocity", "set-based tasks are defined at velocity level, got "
@@ -145,6 +130,8 @@ class TangentCone(NamedRows, Written):
 
         def write() -> None:
             write_rows()
-            rows.lower[:], rows.upper[:] = self.reference_velocity(state), np.inf
+            inside = self.error(state) < 0.0
+            rows.lower[:] = np.where(inside, -np.inf, self.desired_velocity(state))
+            rows.upper[:] = np.inf
 
         return write
