@@ -21,15 +21,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from hierarchy.avoidance.body import ControlPoint, Points, pack_points
-from hierarchy.errors import (
-    HierarchyError,
-    check_name,
-    expect,
-    expect_each,
-    finite_numbers,
-    refuse,
-    text,
-)
+from hierarchy.errors import HierarchyError, check_name, expect, expect_each, finite_numbers, refuse
 from hierarchy.gate import array_of, axes_along, readable, shaped
 from hierarchy.jit import compiled
 from hierarchy.kinematics import crossed, dot, place, row_times, write_point_jacobian
@@ -72,24 +64,23 @@ class Contact:
 
     def __post_init__(self) -> None:
         expect("contact: frame", self.frame, Frame, "give robot.frame(name)")
-        text("contact: name", self.name)
         expect("contact: slides", self.slides, bool, "give True or False")
-        set_frozen(self, name=self.name or self.frame.name)
-        check_fields(self, f"contact {self.name!r}")
-        points = array_of(f"contact {self.name!r}: points", self.points)
+        set_frozen(self, name=self.name if str(self.name) else self.frame.name)
+        what = f"contact {self.name!r}"
+        check_fields(self, what)
+        points, spans = (array_of(f"{what}: {key}", getattr(self, key))
+                         for key in ("points", "open"))
+        axes, sole = (axes_along(f"{what}: {key}", getattr(self, key)) for key in ("normal", "up"))
         refuse(points.ndim != 2 or points.shape[1] != 3 or not np.isfinite(points).all(),
-               f"contact {self.name!r}: points {self.points!r} are not (k, 3) numbers")
+               f"{what}: points {self.points!r} are not (k, 3) numbers")
         refuse(len(points) != 1 and np.linalg.matrix_rank(points - points.mean(0), tol=1e-6) < 2,
-               f"contact {self.name!r}: {len(points)} points on one line; a contact has one "
-               "point, or at least three of a surface")
-        axes, sole = (axes_along(f"contact {self.name!r}: {key}", getattr(self, key))
-                      for key in ("normal", "up"))
-        spans = array_of(f"contact {self.name!r}: open", self.open)
+               f"{what}: {len(points)} points on one line; a contact has one point, or at least "
+               "three of a surface")
         refuse(spans.size and (spans.shape[1:] != (2,) or not (spans[:, 0] < spans[:, 1]).all()),
-               f"contact {self.name!r}: open {self.open!r}, expected pairs of times [s], each from "
-               "a time until a later one")
-        refuse(self.slides and len(points) > 1, f"contact {self.name!r}: {len(points)} points "
-               "that slide; only a contact of one point does")
+               f"{what}: open {self.open!r}, expected pairs of times [s], each from a time until a "
+               "later one")
+        refuse(self.slides and len(points) > 1, f"{what}: {len(points)} points that slide; only a "
+               "contact of one point does")
         set_frozen(self, axes=axes, sole=sole)
 
     @classmethod

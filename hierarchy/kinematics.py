@@ -264,19 +264,15 @@ def times_transposed(A, B):
 @inlined
 def turned_back(R, a):
     """R^T a of a rotation (3, 3) and a tuple."""
-    return (R[0, 0] * a[0] + R[1, 0] * a[1] + R[2, 0] * a[2],
-            R[0, 1] * a[0] + R[1, 1] * a[1] + R[2, 1] * a[2],
-            R[0, 2] * a[0] + R[1, 2] * a[1] + R[2, 2] * a[2])
+    return dot(column(R, 0), a), dot(column(R, 1), a), dot(column(R, 2), a)
 
 
 @internal
 def rotation_of(placements, spot):
     """World rotation (3, 3) of a spot."""
-    R, T, rotation = np.empty((3, 3)), placements[spot.joint], spot.rotation
-    for i in range(3):
-        for k in range(3):
-            R[i, k] = (T[i] * rotation[0, k] + T[3 + i] * rotation[1, k]
-                       + T[6 + i] * rotation[2, k])
+    R, T = np.empty((3, 3)), placements[spot.joint]
+    for k in range(3):
+        R[0, k], R[1, k], R[2, k] = turned(T, column(spot.rotation, k))
     return R
 
 

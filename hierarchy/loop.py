@@ -44,14 +44,12 @@ class Watchdog:
         self.limit, self.fired, self.ended = limit, False, False
         self.error: BaseException | None = None
         self._stop, self._clock, self._over, self._stopped = stop, clock, Event(), Event()
-        self._lock, self._begun, self._fed = Lock(), False, clock()
+        self._begun, self._fed = Lock(), clock()  # a lock that who stops takes, and keeps
         self._thread = Thread(target=self._watch, name="watchdog", daemon=True)
 
     def stop(self) -> None:
         """Call `stop` unless it has already been called, from any thread."""
-        with self._lock:
-            first, self._begun = not self._begun, True
-        if first:
+        if self._begun.acquire(blocking=False):
             self._stop()
             self.ended = True
 
@@ -96,6 +94,11 @@ class Watchdog:
 PERCENTILES = {"median": 50.0, "p95": 95.0, "p99.9": 99.9, "max": 100.0}
 
 
+def _of_ticks(kept: str) -> Any:
+    """Return an array of a log as far as ticks ran."""
+    return property(lambda log: getattr(log, kept)[:log.count])
+
+
 class Log:
     """Times and commands of each tick that ran; memory is allocated before the loop starts.
 
@@ -106,17 +109,22 @@ class Log:
     be applied.
     """
 
+    tick: NDArray[np.int64] = _of_ticks("_tick")
+    late: Array = _of_ticks("_late")
+    duration: Array = _of_ticks("_duration")
+    command: Array = _of_ticks("_command")
+
     def __init__(self, period: float, ticks: int, width: int = 0) -> None:
         self.period, self.planned, self.count, self.due = period, ticks, 0, 0
         self.ended, self.notes = "not begun", list[str]()
         self._tick = np.full(ticks, -1, dtype=np.int64)
-        self._times = np.full((ticks, 2), np.nan)
+        self._late, self._duration = np.full((2, ticks), np.nan)
         self._command = np.full((ticks, width), np.nan)
 
     def write(self, tick: int, late: float, duration: float, command: Any) -> None:
         """Record one tick."""
         k = self.count
-        self._tick[k], self._times[k] = tick, (late, duration)
+        self._tick[k], self._late[k], self._duration[k] = tick, late, duration
         if width := self._command.shape[1]:
             try:
                 self._command[k] = command
@@ -124,26 +132,6 @@ class Log:
                 raise HierarchyError(f"loop: record = {width}, and the command is "
                                      f"{brief(command)}") from error
         self.count, self.due = k + 1, tick + 1
-
-    @property
-    def tick(self) -> NDArray[np.int64]:
-        """Planned number of each tick: (K,)."""
-        return self._tick[:self.count]
-
-    @property
-    def late(self) -> Array:
-        """Delay of the start of each tick: (K,) [s]."""
-        return self._times[:self.count, 0]
-
-    @property
-    def duration(self) -> Array:
-        """Duration of each tick: (K,) [s]."""
-        return self._times[:self.count, 1]
-
-    @property
-    def command(self) -> Array:
-        """Command of each tick: (K, n)."""
-        return self._command[:self.count]
 
     @property
     def overruns(self) -> int:
@@ -163,8 +151,7 @@ class Log:
 
     def arrays(self) -> dict[str, NDArray[Any]]:
         """Return the arrays of the log by name, for `numpy.savez`."""
-        return {"tick": self.tick, "late": self.late, "duration": self.duration,
-                "command": self.command}
+        return {name: getattr(self, name) for name in ("tick", "late", "duration", "command")}
 
     def __str__(self) -> str:
         rows = [f"{name:9}" + "".join(f"{label:>9} {1e6 * value:8.1f} us"

@@ -57,8 +57,8 @@ class _Asked(NamedTuple):
 class Measured(Task):
     """A task that one compiled function measures, for all levels. Abstract.
 
-    A new one needs `dimension` and `measure`. A task with a `path` follows it: rows i of the task
-    and of the path belong together, see `columns`.
+    A new one needs `dimension` or `row_names`, and `measure`. A task with a `path` follows it: rows
+    i of the task and of the path belong together, see `columns`.
     """
 
     path: Path | None = None

@@ -24,15 +24,7 @@ from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal, TypeVar, get_args
 
-from hierarchy.errors import (
-    HierarchyError,
-    check_name,
-    expect,
-    naming,
-    of_user,
-    refuse,
-    text,
-)
+from hierarchy.errors import HierarchyError, check_name, expect, naming, of_user, refuse, text
 
 if TYPE_CHECKING:
     from importlib.metadata import EntryPoint

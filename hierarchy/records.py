@@ -16,13 +16,13 @@ from typing import Annotated, Any, Literal, get_args, get_origin, get_type_hints
 
 import numpy as np
 
-from hierarchy.errors import check_choice, finite_numbers, number, positive, real, whole
+from hierarchy.errors import check_choice, finite_numbers, number, positive, real, text, whole
 
 Check = Callable[[str, Any], Any]
 Positive = Annotated[float, positive]
 NotNegative = Annotated[float, partial(number, least=0.0)]
 Vector3 = Annotated[Sequence[float], partial(finite_numbers, size=3)]
-NUMBERS: dict[Any, Check] = {float: real, int: whole}
+PLAIN: dict[Any, Check] = {float: real, int: whole, str: text}
 _Asked = tuple[str, str, bool, Check, bool]  # name, also with unit, may be None, check, a number
 _known: dict[type, list[_Asked]] = {}  # what is asked of the fields of each class
 
@@ -34,7 +34,7 @@ def set_frozen(record: object, **values: object) -> None:
         put(record, name, value)
 
 
-def check_fields(record: object, what: str, plain: Mapping[Any, Check] = NUMBERS,
+def check_fields(record: object, what: str, plain: Mapping[Any, Check] = PLAIN,
                  free: Collection[str] = ()) -> None:
     """Raise a HierarchyError for a field that is not what its type asks for; make numbers floats.
 
@@ -67,7 +67,7 @@ def _asked(kind: Any, plain: Mapping[Any, Check], free: Collection[str]) -> Iter
             check = partial(check_choice, known=get_args(own))
         if check is not None:
             said = "".join((field.name, *(f" [{one}]" for one in unit)))
-            yield field.name, said, optional, check, own in NUMBERS
+            yield field.name, said, optional, check, own in (float, int)
 
 
 def _hint(kind: type, field: Field[Any], names: Mapping[str, Any]) -> Any:

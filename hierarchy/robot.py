@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from operator import attrgetter
@@ -132,13 +132,14 @@ class Robot:
     rad/s]; `actuated` is the index of the first actuated velocity: 6 or 0. `lower`, `upper` (nq,)
     [rad or m], `velocity_limit` (n,) [rad/s or m/s] and `effort_limit` (n,) [N m or N] are infinite
     where the model has none, but for the speed of the base, see `limit_base`. `coordinates` (n,) is
-    the index in q of the (first) position of each velocity. `parents`, `masses` [kg] and `centres`
-    (joints + 1, 3) [m] have the joint that carries each joint, and the body that it moves. `rest`
-    (nq,) is the default initial configuration. `missing` has sentences about what the file does not
-    give, or gives and the robot is without; `coupled` joints follow another one in the file,
-    `loops` are chains that it closes, `starts` the configurations (nq,) that it names, `apart`
-    pairs of joints whose bodies it lets touch. `table` is the table that the robot was made from,
-    or None.
+    the index in q of the (first) position of each velocity, `velocity_units` (n) the unit of that,
+    "rad" or "m"; `velocity_names` (n) and `coordinate_names` (nq) are those of joints, numbered
+    where one has several. `parents`, `masses` [kg] and `centres` (joints + 1, 3) [m] have the joint
+    that carries each joint, and the body that it moves. `rest` (nq,) is the default initial
+    configuration. `missing` has sentences about what the file does not give, or gives and the robot
+    is without; `coupled` joints follow another one in the file, `loops` are chains that it closes,
+    `starts` the configurations (nq,) that it names, `apart` pairs of joints whose bodies it lets
+    touch. `table` is the table that the robot was made from, or None.
     """
 
     lower: Array = _sized("lower", "nq")
@@ -177,8 +178,13 @@ class Robot:
                 for limits, none in (self.lower, -np.inf), (self.upper, np.inf):
                     own = limits[part.q:part.q + part.size]
                     own[np.abs(own) == _UNIT] = none
-        self.coordinates = np.array([part.q for part in self.parts
-                                     for _ in range(part.velocities)])
+        moved = [part for part in self.parts for _ in range(part.velocities)]
+        self.coordinates = np.array([part.q for part in moved])
+        self.velocity_units = [part.unit for part in moved]
+        self.velocity_names, self.coordinate_names = (
+            [f"{name} {i + 1}" if size > 1 else name
+             for name, size in zip(self.joint_names, sizes, strict=True) for i in range(size)]
+            for sizes in zip(*((joint.nv, joint.nq) for joint in model.joints[1:]), strict=True))
         inertias = list(model.inertias)
         self.masses = np.array([0.0, *(float(inertia.mass) for inertia in inertias[1:])])
         self.centres = np.array([np.zeros(3), *(inertia.lever for inertia in inertias[1:])])
@@ -217,10 +223,9 @@ class Robot:
         """
         expect("Robot.named: name", name, str, "give a name of ROBOTS")
         _check_base(name, base)
-        found = TABLES.get(name) or plugins.find("robots", name)
+        found = plugins.find("robots", name)
         if found is None:
-            known = {*TABLES, *plugins.own("robots")}
-            raise UnknownNameError("robot", name, known, elsewhere(name))
+            raise UnknownNameError("robot", name, plugins.known("robots"), elsewhere(name))
         with of_user(f"robot {name!r} of a plugin"):
             made = found if isinstance(found, Table | str | Path | cls) else found()
         if isinstance(made, str | Path):
@@ -301,25 +306,6 @@ class Robot:
         names = dict.fromkeys(str(frame.name) for frame in self.model.frames)
         return [name for name in names if name not in unclear]
 
-    @cached_property
-    def velocity_names(self) -> list[str]:
-        """The joint name of each velocity (n), numbered where a joint has several."""
-        return self._numbered([joint.nv for joint in self.model.joints[1:]])
-
-    @property
-    def velocity_units(self) -> list[str]:
-        """The unit of the position of each velocity (n): "rad" or "m"."""
-        return [part.unit for part in self.parts for _ in range(part.velocities)]
-
-    @cached_property
-    def coordinate_names(self) -> list[str]:
-        """The joint name of each entry of q (nq), numbered where a joint has several."""
-        return self._numbered([joint.nq for joint in self.model.joints[1:]])
-
-    def _numbered(self, sizes: Iterable[int]) -> list[str]:
-        return [f"{name} {i + 1}" if size > 1 else name
-                for name, size in zip(self.joint_names, sizes, strict=True) for i in range(size)]
-
     def start(self, name: str) -> Array:
         """Return a copy of the configuration (nq,) that the file calls `name`; UnknownNameError."""
         check_name("keyframe", name, self.starts)
@@ -387,12 +373,10 @@ class Robot:
     def bodies(self) -> tuple[Body, ...]:
         """Return the robot's bodies in the order of its joints, to build it in another engine."""
         return tuple(
-            Body(name, int(self.model.parents[i]), placement.translation.copy(),
-                 placement.rotation.copy(), float(inertia.mass), inertia.lever.copy(),
-                 inertia.inertia.copy())
-            for i, (name, placement, inertia) in enumerate(
-                zip(self.joint_names, list(self.model.jointPlacements)[1:],
-                    list(self.model.inertias)[1:], strict=True), 1))
+            Body(name, parent, at.translation.copy(), at.rotation.copy(), float(inertia.mass),
+                 inertia.lever.copy(), inertia.inertia.copy())
+            for name, parent, at, inertia in zip(self.joint_names, *(list(kept)[1:] for kept in (
+                self.parents, self.model.jointPlacements, self.model.inertias)), strict=True))
 
     @cached_property
     def supports(self) -> NDArray[np.bool_]:

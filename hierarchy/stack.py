@@ -71,7 +71,13 @@ class Stack:
                 f"contacts need the level 'torque', not {level!r}")
         self.level: Level = level
         self.contacts = contacts
-        self._metric = _metric(metric, contacts)
+        if isinstance(metric, str):
+            refuse(metric != "mass", f"metric must be (n, n), 'mass' or None, got {metric!r}")
+            refuse(contacts and contacts.contacts, "metric 'mass' is over accelerations alone, and "
+                   "contact forces have no mass; give a metric over both")
+        elif metric is not None:
+            metric = checked_metric(metric)
+        self._metric = metric
         self._tasks: dict[str, Task] = {}
         self._order: tuple[str, ...] = ()
         self._prepared: dict[tuple[str, ...], _Prepared] = {}
@@ -267,15 +273,3 @@ def _crossed(lower, upper):
         if lower[i] > upper[i]:
             return i
     return -1
-
-
-def _metric(metric: ArrayLike | Literal["mass"] | None,
-            contacts: Contacts | None) -> Array | Literal["mass"] | None:
-    if metric is None:
-        return None
-    if not isinstance(metric, str):
-        return checked_metric(metric)
-    refuse(metric != "mass", f"metric must be (n, n), 'mass' or None, got {metric!r}")
-    refuse(contacts is not None and contacts.contacts, "metric 'mass' is over accelerations "
-           "alone, and contact forces have no mass; give a metric over both")
-    return "mass"

@@ -183,17 +183,14 @@ class State:
     @cached_property
     def dynamics(self) -> Dynamics:
         """M(q) and h(q, v) as views; after the first use, each `move` computes them."""
-        model, data = self._with_masses()
-        self._from_now_on(partial(pin.crba, model, data, self.q),
-                          partial(pin.nonLinearEffects, model, data, self.q, self.v))
+        data = self._from_now_on((pin.crba, self.q), (pin.nonLinearEffects, self.q, self.v))
         return Dynamics(_columns(data.M, self.n), data.nle)
 
     @cached_property
     def momentum(self) -> Momentum:
         """The centroidal momentum matrix and its derivative: views, as those of `dynamics`."""
-        model, data = self._with_masses()
         # Not computeCentroidalMapTimeVariation: its dA is not the derivative of A (pinocchio 4.1).
-        self._from_now_on(partial(pin.dccrba, model, data, self.q, self.v))
+        data = self._from_now_on((pin.dccrba, self.q, self.v))
         return Momentum(_columns(data.Ag, 6), _columns(data.dAg, 6))
 
     @cached_property
@@ -201,14 +198,13 @@ class State:
         """Another state of the robot, to move for differences."""
         return State(self.robot)
 
-    def _with_masses(self) -> tuple[Any, Any]:
+    def _from_now_on(self, *calls: tuple[Any, ...]) -> Any:
+        """Call functions of pinocchio now and after each `move`; return what they write into."""
         refuse(not self.robot.masses.any(), f"robot {self.robot.name!r} has no masses")
-        return self._model, self._data
-
-    def _from_now_on(self, *computations: Callable[[], object]) -> None:
-        self._further += computations
-        for compute in computations:
-            compute()
+        for function, *read in calls:
+            function(self._model, self._data, *read)
+            self._further += (partial(function, self._model, self._data, *read),)
+        return self._data
 
     def _keep_kinematics(self) -> None:
         np.copyto(self.previous_J, self.J)
@@ -224,7 +220,7 @@ class State:
 
     def centre_of_mass(self) -> Array:
         """World position (3,) [m] of the centre of mass of the bodies that joints move."""
-        self._with_masses()
+        self._from_now_on()
         R = self.placements[:, :9].reshape(-1, 3, 3)  # column by column
         points = self.placements[:, 9:] + np.einsum("jki,jk->ji", R, self.robot.centres)
         return np.asarray(self.robot.shares @ points)

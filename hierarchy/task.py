@@ -19,7 +19,7 @@ from hierarchy.errors import HierarchyError, brief, check_choice, expect, refuse
 from hierarchy.gate import check_rows, shaped
 from hierarchy.paths import Path
 from hierarchy.problem import Array
-from hierarchy.records import NUMBERS, Check, check_fields, equal
+from hierarchy.records import PLAIN, Check, check_fields, equal
 from hierarchy.robot import Frame, Robot
 from hierarchy.state import State
 
@@ -48,7 +48,7 @@ def _made(kind: type, remedy: str) -> Check:
 
 
 _PARTS: dict[Any, Check] = {  # of a task, by the type of the field
-    **NUMBERS, Sequence[ControlPoint]: lambda what, value: refuse(
+    **PLAIN, Sequence[ControlPoint]: lambda what, value: refuse(
         not len(pack_points(value).joints), f"{what}: expected at least one control point"),
     Robot: _made(Robot, "Robot.load(NAME)"), Frame: _made(Frame, "robot.frame(NAME)"),
     Path: _made(Path, "a path of hierarchy.paths, such as Still([x, y, z])"),
@@ -77,8 +77,9 @@ class Rows(NamedTuple):
 class Task(ABC):
     """m rows over the joints: J v = dp/dt, or J a + dJ/dt v = d2p/dt2. Abstract.
 
-    A new task needs `name`, `dimension` (m), `error`, `jacobian` and `jacobian_derivative`. The
-    closed loop is, with the error e = p_d - p (equations (7), (12) and [19] of the letter):
+    A new task needs `name`, `dimension` (m) or `row_names`, `error`, `jacobian` and
+    `jacobian_derivative`. The closed loop is, with the error e = p_d - p (equations (7), (12) and
+    [19] of the letter):
 
     - velocity level: dp/dt = dp_d/dt + gain e
     - acceleration level: d2p/dt2 = d2p_d/dt2 + damping (dp_d/dt - J v) + stiffness e
@@ -127,9 +128,10 @@ class Task(ABC):
         refuse(wrong, f"task {self.name!r}: {said}")
 
     @property
-    @abstractmethod
     def dimension(self) -> int:
-        """Number of rows m."""
+        """Number of rows m; by default there is one for each of `row_names`."""
+        self.refuse(type(self).row_names is Task.row_names, "its class gives no dimension")
+        return len(self.row_names)
 
     @property
     def row_names(self) -> tuple[str, ...]:
@@ -334,24 +336,10 @@ def writer_in_stack(task: Task, state: State, level: Level, rows: Rows) -> Write
         raise HierarchyError(f"task {task.name!r}: {error}") from error
 
 
-class NamedRows(Task):
-    """A task with as many rows as names of them. Abstract: needs `row_names`."""
-
-    @property
-    def dimension(self) -> int:
-        """Number of rows m."""
-        return len(self.row_names)
-
-    @property
-    @abstractmethod
-    def row_names(self) -> tuple[str, ...]:
-        """What each row is about."""
-
-
 class Written(Task):
     """A task whose equations are in its writer alone; the plain methods read them there. Abstract.
 
-    A new one needs `dimension`, `error` and `writer`.
+    A new one needs `dimension` or `row_names`, `error` and `writer`.
     """
 
     @abstractmethod

@@ -46,7 +46,7 @@ from hierarchy.measured import Measure, Measured, measured
 from hierarchy.problem import Array
 from hierarchy.records import NotNegative, Positive
 from hierarchy.state import State
-from hierarchy.task import Level, NamedRows, Rows, Task, Writer, Written, in_turn, seen_by
+from hierarchy.task import Level, Rows, Task, Writer, Written, in_turn, seen_by
 from hierarchy.tasks.joints.joint_limits import JointLimits
 from hierarchy.tasks.joints.posture import JointTask
 
@@ -163,7 +163,7 @@ def _add(kinematics, parameters, seen, lower, upper):
 
 
 @dataclass(frozen=True)
-class DangerBounds(NamedRows, Written):
+class DangerBounds(Written):
     """Keep every joint within `limits` and slow those that move a control point to an obstacle.
 
     n rows, those of `limits`, with a box that is at most as large and never empty; see the module

@@ -14,11 +14,10 @@ from hierarchy.paths import Path
 from hierarchy.problem import Array
 from hierarchy.robot import Robot
 from hierarchy.state import State
-from hierarchy.task import NamedRows
 
 
 @dataclass(frozen=True)
-class CentreOfMass(NamedRows, Measured):
+class CentreOfMass(Measured):
     """Move the robot's centre of mass along `path` in the chosen world axes [m].
 
     `axes` are some of 0, 1, 2 for x, y, z in increasing order, one row per axis: (0, 1) leaves the
@@ -87,7 +86,7 @@ _PARTS = {"both": slice(0, 6), "linear": slice(0, 3), "angular": slice(3, 6)}
 
 
 @dataclass(frozen=True)
-class Momentum(NamedRows, Measured):
+class Momentum(Measured):
     """Bring the momentum of the whole robot to `target`, about its centre of mass.
 
     `part` is "linear" (m = 3) [kg m/s], "angular" (m = 3) [kg m^2/s] or "both" (m = 6), linear

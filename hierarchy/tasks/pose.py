@@ -35,7 +35,6 @@ from hierarchy.paths import Path
 from hierarchy.problem import Array
 from hierarchy.robot import Frame
 from hierarchy.state import State
-from hierarchy.task import NamedRows
 
 
 @measured
@@ -71,7 +70,6 @@ class Pose(Measured):
     damping: float = 20.0
     gain: float = 10.0
     name: str = "pose"
-    dimension = 6
     row_names = ("x", "y", "z", "about x", "about y", "about z")
 
     def measure(self, state: State) -> Measure:
@@ -93,7 +91,6 @@ class Orientation(Measured):
     damping: float = 20.0
     gain: float = 10.0
     name: str = "orientation"
-    dimension = 3
     row_names = Pose.row_names[3:]
 
     def measure(self, state: State) -> Measure:
@@ -186,7 +183,7 @@ def _along(e: Array, rate: Array) -> Array:
 
 
 @dataclass(frozen=True)
-class RelativePose(NamedRows, Measured):
+class RelativePose(Measured):
     """Keep `frame` at `position` (3,) [m] and `rotation` (3, 3) in the axes of the frame `to`.
 
     m = 6, or 3 with `rotation` None: then only the position counts. The orientation error is the

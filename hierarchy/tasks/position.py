@@ -13,7 +13,7 @@ from hierarchy.paths import Path
 from hierarchy.problem import Array
 from hierarchy.robot import Frame
 from hierarchy.state import State
-from hierarchy.task import Level, NamedRows, Rows, Writer, Written
+from hierarchy.task import Level, Rows, Writer, Written
 
 _NOTHING_SEEN = Measurement(0).arrays
 
@@ -48,7 +48,6 @@ class Position(Measured):
     gain: float = 10.0
     repulsion_within: float = -1.0
     name: str = "position"
-    dimension = 3
     row_names = ("x", "y", "z")
 
     def measure(self, state: State) -> Measure:
@@ -58,7 +57,7 @@ class Position(Measured):
 
 
 @dataclass(frozen=True)
-class Along(NamedRows, Written):
+class Along(Written):
     """The rows of a position task along `directions` (m, 3) of the world, m = 1, 2 or 3 [m].
 
     A hand that slides on a table is moved along two of them and pushes along the third. The gains

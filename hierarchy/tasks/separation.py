@@ -52,14 +52,14 @@ from hierarchy.problem import Array
 from hierarchy.records import set_frozen
 from hierarchy.robot import Robot
 from hierarchy.state import State
-from hierarchy.task import Level, NamedRows, Rows, Writer, Written
+from hierarchy.task import Level, Rows, Writer, Written
 
 _SHARPEST = 1e-3  # [m] smallest radius of turning that is used
 _POSTURES = 200   # in which proposed capsules are looked at
 
 
 @dataclass(frozen=True)
-class Separation(NamedRows, Written):
+class Separation(Written):
     """Keep every point at `barrier.distance` or more from every obstacle (m = points x obstacles).
 
     `points` are those of the sensor in its order, the end effector last; `obstacles` is how many
@@ -153,7 +153,7 @@ def _write_points(kinematics, parameters, pairs, A, lower, upper):
 
 
 @dataclass(frozen=True)
-class SelfSeparation(NamedRows, Written):
+class SelfSeparation(Written):
     """Keep pairs of capsules of the robot at `barrier.distance` or more (m = pairs).
 
     `pairs` are indices of `capsules`; None takes every pair of a chain except neighbours, and

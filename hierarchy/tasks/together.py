@@ -11,11 +11,11 @@ from hierarchy.problem import Array
 from hierarchy.records import set_frozen
 from hierarchy.robot import Robot
 from hierarchy.state import State
-from hierarchy.task import Level, NamedRows, Rows, Task, Writer, Written, in_turn, writer_in_stack
+from hierarchy.task import Level, Rows, Task, Writer, Written, in_turn, writer_in_stack
 
 
 @dataclass(frozen=True)
-class Together(NamedRows, Written):
+class Together(Written):
     """The rows of several tasks as one level: m is the sum of theirs.
 
     What cannot all be met is missed by the smallest sum of squares over all rows, so the rows
@@ -83,7 +83,7 @@ class Together(NamedRows, Written):
 
 
 @dataclass(frozen=True)
-class TangentCone(NamedRows, Written):
+class TangentCone(Written):
     """Keep an inequality task in its set by its rate alone, at velocity level.
 
     A row of `task` whose error is negative, strictly inside, has no bounds; one on the bound or

@@ -7,9 +7,9 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from hierarchy import plugins
-from hierarchy.errors import number, text
+from hierarchy.errors import number
 from hierarchy.problem import Array
-from hierarchy.records import check_fields
+from hierarchy.records import PLAIN, check_fields
 from scenarios.recording.recording import Recording
 
 # Display units by SI unit: how many of them make one, what it is called, decimals.
@@ -43,7 +43,7 @@ class Metric:
     detail: bool = False
 
     def __post_init__(self) -> None:
-        check_fields(self, f"metric {self.name!r}", {float: number, str: text})
+        check_fields(self, f"metric {self.name!r}", PLAIN | {float: number})
 
     @property
     def _display(self) -> tuple[float, str, int]:

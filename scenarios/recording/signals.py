@@ -13,7 +13,7 @@ from typing import Any
 from numpy.typing import NDArray
 
 from hierarchy import plugins
-from hierarchy.errors import expect, refuse, text
+from hierarchy.errors import expect, refuse
 from hierarchy.records import check_fields
 
 OTHER = "/other"  # the topic of what has no other
@@ -39,7 +39,7 @@ class Signal:
 
     def __post_init__(self) -> None:
         what = f"signal {self.name!r}"
-        check_fields(self, what, {str: text})
+        check_fields(self, what)
         refuse(not re.fullmatch(r"[a-zA-Z]\w*\*?", self.name) or self.name in _TAKEN, f"{what}: "
                f'a name has letters, digits and "_", begins with a letter, and is none of '
                f"{', '.join(_TAKEN)}")

@@ -13,14 +13,14 @@ from hierarchy.paths import Still
 from hierarchy.problem import Array
 from hierarchy.robot import Frame
 from hierarchy.state import State
-from hierarchy.task import Level, NamedRows, Rows, Task, Writer, Written
+from hierarchy.task import Level, Rows, Task, Writer, Written
 from hierarchy.tasks.pose import Pose
 from hierarchy.tasks.position import Along, Position
 from hierarchy.tasks.together import Together
 
 
 @dataclass(frozen=True)
-class ContactMotion(NamedRows, Written):
+class ContactMotion(Written):
     """Keep contacts at rest: J_c a + dJ_c/dt v = -damping v_c + stiffness e [m/s^2, rad/s^2].
 
     Three rows for a point, those of `Position`, one of them along the normal for a point that

@@ -19,7 +19,7 @@ from hierarchy.problem import Array
 from hierarchy.records import Positive
 from hierarchy.robot import Robot
 from hierarchy.state import State
-from hierarchy.task import Level, NamedRows, Rows, Writer, Written, in_turn
+from hierarchy.task import Level, Rows, Writer, Written, in_turn
 from hierarchy.tasks.joints.joint_limits import JointRows
 
 WRENCH = tuple(f"{kind} {axis}" for kind in ("force", "moment") for axis in "xyz")
@@ -43,7 +43,7 @@ class ForceTask(Written):
         return np.asarray(np.clip(0.0, lower, upper))
 
 
-class FixedRows(NamedRows, ForceTask):
+class FixedRows(ForceTask):
     """Rows over the forces of each contact, the same at any state. Abstract: needs `of_contact`."""
 
     @abstractmethod
@@ -81,7 +81,7 @@ def _copy(rows, low, up, A, lower, upper):
 
 
 @dataclass(frozen=True)
-class ContactForce(NamedRows, ForceTask):
+class ContactForce(ForceTask):
     """Let the surroundings push on one contact with `target`, the sum over its points.
 
     `target` has 1 number for the normal force [N], 3 for the force in world axes [N], or 6 for the
@@ -276,7 +276,7 @@ def write_torques(parameters, bounds, A, lower, upper):
 
 
 @dataclass(frozen=True)
-class BaseDynamics(NamedRows, ForceTask):
+class BaseDynamics(ForceTask):
     """Let the contact forces move the base: M_b(q) a + h_b(q, v) = J_cb^T f [N, N m].
 
     Six rows, those of the floating base; none for a fixed one. It belongs at the top of a stack: an

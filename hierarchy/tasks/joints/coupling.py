@@ -19,7 +19,6 @@ from hierarchy.robot import Robot
 from hierarchy.robots.found import Coupled
 from hierarchy.robots.joints import Part
 from hierarchy.state import State
-from hierarchy.task import NamedRows
 
 
 class Terms(NamedTuple):
@@ -38,7 +37,7 @@ class Terms(NamedTuple):
     turns: Array
 
 
-class _Coupling(NamedRows, Measured):
+class _Coupling(Measured):
     """Rows in which polynomials of joints add up to zero. Abstract: needs `terms`."""
 
     terms: Terms

@@ -14,10 +14,10 @@ from hierarchy.problem import Array
 from hierarchy.records import NotNegative, set_frozen
 from hierarchy.robot import Robot
 from hierarchy.state import State
-from hierarchy.task import Level, NamedRows, Rows, Writer, Written
+from hierarchy.task import Level, Rows, Writer, Written
 
 
-class JointRows(NamedRows, Written):
+class JointRows(Written):
     """A task with one row per actuated joint of `robot`, or per velocity from `first` on."""
 
     robot: Robot

@@ -15,7 +15,7 @@ from hierarchy.errors import expect, positive
 from hierarchy.problem import Array
 from hierarchy.robot import Robot
 from hierarchy.state import State
-from hierarchy.task import Level, NamedRows, Rows, Task, Writer, Written
+from hierarchy.task import Level, Rows, Task, Writer, Written
 from hierarchy.tasks.joints.coupling import FollowedJoints
 from hierarchy.tasks.pose import RelativePose
 from hierarchy.tasks.together import Together
@@ -68,7 +68,7 @@ def above(rows: Sequence[Task], limits: Sequence[Task], anywhere: bool) -> list[
 
 @final
 @dataclass(frozen=True)
-class ClosedChains(NamedRows, Written):
+class ClosedChains(Written):
     """The rows of `whole` that are independent of each other.
 
     A chain in a plane closes out of it by itself, but for the rounding of its file. So of all rows,
