@@ -87,10 +87,6 @@ class Measured(Task):
         """
         return None if self.path is None else self.path.writer(goal)
 
-    def error(self, state: State) -> Array:
-        """Error p_d - p at a state: (m,), in the task's unit."""
-        return self._measured(state)[1].error
-
     def error_reader(self, state: State) -> Callable[[], Array]:
         """See `Task.error_reader`; each call overwrites the array of the last."""
         read = self._reader(state)

@@ -58,12 +58,8 @@ class Together(Written):
         """Task and row of each row."""
         return tuple(f"{task.name} {row}" for task in self.tasks for row in task.row_names)
 
-    def error(self, state: State) -> Array:
-        """The errors of the tasks (m,)."""
-        return self.error_reader(state)()
-
     def error_reader(self, state: State) -> Callable[[], Array]:
-        """See `Task.error_reader`."""
+        """See `Task.error_reader`: the errors of the tasks (m,)."""
         readers = [task.error_reader(state) for task in self.tasks]
         return lambda: np.hstack([read() for read in readers])  # of one row maybe a number
 
@@ -126,12 +122,10 @@ class TangentCone(Written):
         """See `Task.writer`."""
         self.refuse(level != "velocity", "set-based tasks are defined at velocity level, got "
                     f"level = {level!r}")
-        write_rows = self.task.writer(state, level, rows)
 
-        def write() -> None:
-            write_rows()
+        def bound() -> None:
             inside = self.error(state) < 0.0
             rows.lower[:] = np.where(inside, -np.inf, self.desired_velocity(state))
             rows.upper[:] = np.inf
 
-        return write
+        return in_turn(self.task.writer(state, level, rows), bound)

@@ -15,7 +15,7 @@ from hierarchy.errors import expect, positive
 from hierarchy.problem import Array
 from hierarchy.robot import Robot
 from hierarchy.state import State
-from hierarchy.task import Level, Rows, Task, Writer, Written
+from hierarchy.task import Level, Rows, Task, Writer, Written, in_turn
 from hierarchy.tasks.joints.coupling import FollowedJoints
 from hierarchy.tasks.pose import RelativePose
 from hierarchy.tasks.together import Together
@@ -95,16 +95,14 @@ class ClosedChains(Written):
     def writer(self, state: State, level: Level, rows: Rows) -> Writer:
         """See `Task.writer`."""
         whole = Rows.empty(self.dimension, state.n)
-        write_whole = self.whole.writer(state, level, whole)
 
-        def write() -> None:
-            write_whole()
+        def reduce() -> None:
             V, sizes, c = self.parts(whole.A, whole.lower)
             rows.A[:], rows.lower[:] = 0.0, 0.0
             rows.A[:len(V)], rows.lower[:len(V)] = V, c / sizes
             rows.upper[:] = rows.lower
 
-        return write
+        return in_turn(self.whole.writer(state, level, whole), reduce)
 
     def parts(self, J: Array, side: Array) -> tuple[Array, Array, Array]:
         """Return the independent part of rows J x = side, (m, n) and (m,): V, sizes and c.
