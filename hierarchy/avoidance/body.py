@@ -81,18 +81,12 @@ def pairs_of_tree(capsules: Sequence[Capsule], parents: Sequence[int]) -> list[t
     `parents` has the joint that carries each joint. Neighbours of a capsule are those on the
     nearest joint toward the base that has any.
     """
-    joints = {capsule.joint for capsule in capsules}
-
-    def carrier(joint: int) -> int:
-        while joint > 0:
-            joint = parents[joint]
-            if joint in joints:
-                return joint
-        return -1
-
+    joints, carrier = {capsule.joint for capsule in capsules}, [-1]
+    for above in parents[1:]:  # which come before the joints that they carry
+        carrier.append(above if above in joints else carrier[above])
     return [(i, j) for i, j in combinations(range(len(capsules)), 2)
             for a, b in [(capsules[i].joint, capsules[j].joint)]
-            if a != b and carrier(a) != b and carrier(b) != a]
+            if a != b and carrier[a] != b and carrier[b] != a]
 
 
 def pack_capsules(capsules: Sequence[Capsule]) -> tuple[NDArray[np.int64], Array]:
