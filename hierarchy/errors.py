@@ -126,10 +126,10 @@ def number(what: str, value: object, least: float = -inf, largest: float = inf) 
     raise HierarchyError(f"{what} = {shown}: expected a finite number{_between(least, largest)}")
 
 
-def positive(what: str, value: object) -> float:
-    """Return a finite number > 0; raise a HierarchyError for anything else."""
-    found = number(what, value)
-    refuse(found <= 0.0, f"{what} = {found:g}: expected a number > 0")
+def positive(what: str, value: object, largest: float = inf) -> float:
+    """Return a finite number > 0, at most `largest`; raise a HierarchyError for anything else."""
+    found, most = number(what, value), "" if largest == inf else f", at most {largest:g}"
+    refuse(not 0.0 < found <= largest, f"{what} = {found:g}: expected a number > 0{most}")
     return found
 
 

@@ -74,10 +74,10 @@ class Measured(Task):
 
     @property
     def columns(self) -> NDArray[np.int64]:
-        """The coordinate of the path that each row follows (m,), -1 for a row that follows none."""
-        columns = np.full(self.dimension, -1)
+        """The coordinate of the goal that each row follows (m,), -1 for a row that follows none."""
+        columns = np.arange(self.dimension)
         if self.path is not None:
-            columns[:3] = range(len(columns[:3]))
+            columns[3:] = -1
         return columns
 
     def follow(self, state: State, goal: Array) -> Callable[[float], object] | None:
@@ -86,10 +86,6 @@ class Measured(Task):
         `goal` (3, k), zero before, is for p_d, dp_d/dt and d2p_d/dt2, k three or more `columns`.
         """
         return None if self.path is None else self.path.writer(goal)
-
-    def error(self, state: State) -> Array:
-        """Error p_d - p at a state: (m,), in the task's unit."""
-        return self._measured(state)[1].error
 
     def error_reader(self, state: State) -> Callable[[], Array]:
         """See `Task.error_reader`; each call overwrites the array of the last."""

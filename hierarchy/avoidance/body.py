@@ -81,18 +81,12 @@ def pairs_of_tree(capsules: Sequence[Capsule], parents: Sequence[int]) -> list[t
     `parents` has the joint that carries each joint. Neighbours of a capsule are those on the
     nearest joint toward the base that has any.
     """
-    joints = {capsule.joint for capsule in capsules}
-
-    def carrier(joint: int) -> int:
-        while joint > 0:
-            joint = parents[joint]
-            if joint in joints:
-                return joint
-        return -1
-
+    joints, carrier = {capsule.joint for capsule in capsules}, [-1]
+    for above in parents[1:]:  # which come before the joints that they carry
+        carrier.append(above if above in joints else carrier[above])
     return [(i, j) for i, j in combinations(range(len(capsules)), 2)
             for a, b in [(capsules[i].joint, capsules[j].joint)]
-            if a != b and carrier(a) != b and carrier(b) != a]
+            if a != b and carrier[a] != b and carrier[b] != a]
 
 
 def pack_capsules(capsules: Sequence[Capsule]) -> tuple[NDArray[np.int64], Array]:
@@ -103,8 +97,8 @@ def pack_capsules(capsules: Sequence[Capsule]) -> tuple[NDArray[np.int64], Array
     return joints, np.array(rows, dtype=float).reshape(len(rows), 7)
 
 
-def measure_capsules(placements: Array, joints: NDArray[np.int64], capsules: Array,
-                     pairs: NDArray[np.int64]) -> Array:
+@compiled
+def measure_capsules(placements, joints, capsules, pairs):
     """Return distance, direction and nearest points of each pair of capsules: (M, 6).
 
     A row is the distance [m], negative where the capsules overlap; the unit vector from the second
@@ -112,17 +106,12 @@ def measure_capsules(placements: Array, joints: NDArray[np.int64], capsules: Arr
     the end. placements as in a State; joints (K,) and capsules (K, 7) packed; pairs (M, 2).
     """
     seen = np.empty((len(pairs), 6))
-    _measure(placements, joints, capsules, pairs, seen)
-    return seen
-
-
-@compiled
-def _measure(placements, joints, capsules, pairs, seen):
-    for m in range(pairs.shape[0]):
+    for m in range(len(pairs)):
         i, j = pairs[m, 0], pairs[m, 1]
         seen[m, 0], r, seen[m, 4], seen[m, 5] = nearest_of_capsules(
             placements[joints[i]], capsules[i], placements[joints[j]], capsules[j])
         seen[m, 1], seen[m, 2], seen[m, 3] = r
+    return seen
 
 
 @inlined

@@ -81,7 +81,8 @@ def _centre_of_mass(kinematics, reads, goal, J, motion):
         motion.drift[i] = drift[axes[i]]
 
 
-_ROWS = {"both": (0, 6), "linear": (0, 3), "angular": (3, 6)}
+_MOMENTA = tuple(f"{kind} {axis}" for kind in ("linear", "angular") for axis in "xyz")
+_PARTS = {"both": slice(0, 6), "linear": slice(0, 3), "angular": slice(3, 6)}
 
 
 @dataclass(frozen=True)
@@ -110,35 +111,25 @@ class Momentum(Measured):
     @property
     def row_names(self) -> tuple[str, ...]:
         """Linear and angular momentum along the axes."""
-        names = [f"{kind} {axis}" for kind in ("linear", "angular") for axis in "xyz"]
-        return tuple(names[i] for i in self.columns)
+        return _MOMENTA[_PARTS[self.part]]
 
     def measure(self, state: State) -> Measure:
         """See `Measured.measure`; a momentum has no position, so there is no error."""
-        return _momentum, (*state.momentum, self.columns)
-
-    @property
-    def columns(self) -> NDArray[np.int64]:
-        """The components."""
-        return np.arange(*_ROWS[self.part])
+        return _momentum, (*state.momentum, _PARTS[self.part].start)
 
     def follow(self, state: State, goal: Array) -> Callable[[float], object] | None:
         """The target is in the place of a velocity."""
-        columns, target = self.columns, 0.0 if self.target is None else self.target
-
-        def move(t: float) -> None:
-            goal[1, columns] = target
-
-        move(0.0)
-        return move if isinstance(target, np.ndarray) else None
+        place, target = goal[1, :self.dimension], 0.0 if self.target is None else self.target
+        place[:] = target
+        return (lambda t: np.copyto(place, target)) if isinstance(target, np.ndarray) else None
 
 
 @measured
 def _momentum(kinematics, reads, goal, J, motion):
-    of_robot, rates, rows = reads
+    of_robot, rates, first = reads
     v = kinematics.v
-    for i in range(len(rows)):
+    for i in range(len(J)):
         for c in range(len(v)):
-            J[i, c] = of_robot[rows[i], c]
+            J[i, c] = of_robot[first + i, c]
         motion.rate[i] = row_times(J, i, v)
-        motion.drift[i] = row_times(rates, rows[i], v)
+        motion.drift[i] = row_times(rates, first + i, v)

@@ -42,11 +42,6 @@ class Manipulability(Measured):
     name: str = "manipulability"
     dimension = 1
 
-    @property
-    def rows(self) -> int:
-        """The number of rows of the frame's Jacobian that count."""
-        return 3 if self.part == "position" else 6
-
     def value(self, state: State) -> float:
         """w at a state."""
         return float(self.least - self.error(state)[0])
@@ -55,23 +50,25 @@ class Manipulability(Measured):
         """See `Measured.measure`; HierarchyError for a robot that this task is not for."""
         self.refuse(len(state.supports) != state.n + 1, "a joint of the robot has several "
                     "velocities, or the base floats")
-        self.refuse(state.n < self.rows, f"robot {state.robot.name!r} has {state.n} joints, so the "
-                    f"manipulability of {self.rows} rows is 0 everywhere")
-        return _manipulability, self
+        rows = 3 if self.part == "position" else 6
+        self.refuse(state.n < rows, f"robot {state.robot.name!r} has {state.n} joints, so the "
+                    f"manipulability of {rows} rows is 0 everywhere")
+        return _manipulability, (self.frame, self.least, slice(rows))
 
 
 @plain
-def _manipulability(kinematics: Kinematics, task: Manipulability, goal: Array, J: Array,
-                    motion: Motion) -> None:
+def _manipulability(kinematics: Kinematics, reads: tuple[Frame, float, slice], goal: Array,
+                    J: Array, motion: Motion) -> None:
     """The row is w tr(J^+ dJ/dq_i), with the derivative of J^+ = J^T (J J^T)^-1 in its drift.
 
     w is the product of the singular values, which is more exact than a determinant.
     """
-    placed, v, rows = Placed.of(kinematics, task.frame), kinematics.v, slice(task.rows)
+    frame, least, rows = reads
+    placed, v = Placed.of(kinematics, frame), kinematics.v
     K, dK = placed.J[rows], placed.dJ[rows]
     U, lengths, V = np.linalg.svd(K, full_matrices=False)
     w = lengths.prod()
-    motion.error[0], motion.rate[0], motion.drift[0], J[:] = task.least - w, 0.0, 0.0, 0.0
+    motion.error[0], motion.rate[0], motion.drift[0], J[:] = least - w, 0.0, 0.0, 0.0
     if w < _SINGULAR:
         return
     square, inverse = (U / lengths**2) @ U.T, (V.T / lengths) @ U.T

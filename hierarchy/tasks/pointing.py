@@ -122,7 +122,6 @@ class LookAt(Measured):
     damping: float = 10.0
     gain: float = 5.0
     name: str = "look-at"
-    dimension = 2
     row_names = ("x", "y")
 
     def measure(self, state: State) -> Measure:

@@ -13,7 +13,7 @@ from hierarchy.paths import Path
 from hierarchy.problem import Array
 from hierarchy.robot import Frame
 from hierarchy.state import State
-from hierarchy.task import Level, Rows, Writer, Written
+from hierarchy.task import Level, Rows, Writer, Written, in_turn
 
 _NOTHING_SEEN = Measurement(0).arrays
 
@@ -87,12 +87,8 @@ class Along(Written):
         return tuple(axes.get(tuple(one), f"along {list(one)}") for one in
                      np.array(self.directions, dtype=float).tolist())
 
-    def error(self, state: State) -> Array:
-        """Distance to the path along the directions (m,) [m]."""
-        return self.error_reader(state)()
-
     def error_reader(self, state: State) -> Callable[[], Array]:
-        """See `Task.error_reader`."""
+        """See `Task.error_reader`: the distance to the path along the directions (m,) [m]."""
         directions, read = np.asarray(self.directions), self.task.error_reader(state)
         return lambda: np.asarray(directions @ read())
 
@@ -107,11 +103,9 @@ class Along(Written):
     def writer(self, state: State, level: Level, rows: Rows) -> Writer:
         """See `Task.writer`."""
         three, D = Rows.empty(3, rows.A.shape[1]), np.asarray(self.directions, dtype=float)
-        write_three = self.task.writer(state, level, three)
 
-        def write() -> None:
-            write_three()
+        def project() -> None:
             rows.A[:] = D @ three.A
             rows.lower[:] = rows.upper[:] = D @ three.lower
 
-        return write
+        return in_turn(self.task.writer(state, level, three), project)

@@ -40,35 +40,22 @@ from hierarchy.avoidance.body import (
     pack_capsules,
     pack_points,
     pairs_of_chain,
+    pairs_of_tree,
 )
-from hierarchy.avoidance.laws import (
-    Barrier,
-    drop_rounding,
-    least_acceleration,
-    least_rate,
-)
+from hierarchy.avoidance.laws import Barrier, drop_rounding, least_acceleration, least_rate
 from hierarchy.avoidance.measurement import Pairs
 from hierarchy.errors import HierarchyError, expect_each
 from hierarchy.gate import array_of
 from hierarchy.jit import bind, compiled
-from hierarchy.kinematics import (
-    add_row,
-    crossed,
-    dot,
-    less,
-    moving_point,
-    place,
-    times,
-    turned,
-)
+from hierarchy.kinematics import add_row, crossed, dot, less, moving_point, place, times, turned
 from hierarchy.problem import Array
 from hierarchy.records import set_frozen
 from hierarchy.robot import Robot
 from hierarchy.state import State
 from hierarchy.task import Level, Rows, Writer, Written
-from hierarchy.tasks.pairs import separable_pairs
 
 _SHARPEST = 1e-3  # [m] smallest radius of turning that is used
+_POSTURES = 200   # in which proposed capsules are looked at
 
 
 @dataclass(frozen=True)
@@ -201,7 +188,7 @@ class SelfSeparation(Written):
     def of(cls, robot: Robot, barrier: Barrier) -> SelfSeparation:
         """Return the task of the capsules of a robot that can be that far apart.
 
-        Which are left out: neighbours on its tree, and see `hierarchy.tasks.pairs`.
+        See `separable_pairs` for which are left out.
         """
         return cls(robot.capsules, barrier, tuple(separable_pairs(robot, barrier.distance)))
 
@@ -218,7 +205,8 @@ class SelfSeparation(Written):
 
     def distances(self, state: State) -> Array:
         """Distances d (m,) [m], negative where capsules overlap."""
-        return measure_capsules(state.placements, *pack_capsules(self.capsules), self.indices)[:, 0]
+        packed = pack_capsules(self.capsules)
+        return np.asarray(measure_capsules(state.placements, *packed, self.indices)[:, 0])
 
     def error(self, state: State) -> Array:
         """distance - d (m,) [m], positive where two capsules are too close."""
@@ -257,3 +245,41 @@ def _write_capsules(kinematics, parameters, A, lower, upper):
                           - dot(r, less(drift_a, drift_b)))
         elif D <= settings[2]:
             lower[row] = least_rate(D - settings[0], settings)
+
+
+def separable_pairs(robot: Robot, distance: float) -> list[tuple[int, int]]:
+    """Return the pairs of capsules that can be kept at a distance [m], as indices.
+
+    Neighbours in the tree share a joint and are excluded, and so are pairs that the file excludes.
+    Capsules proposed from a file may be too large: of them, pairs that overlap in the robot's own
+    posture are excluded too, and those that are nearer than `distance` in every one of 200 sampled
+    postures.
+    """
+    pairs = _watched(robot)
+    if robot.table is not None or not pairs:
+        return pairs
+    packed, at = pack_capsules(robot.capsules), State(robot)
+    lower, upper = (np.where(np.isfinite(side), side, turn) for side, turn in
+                    zip(robot.position_limits(), (-np.pi, np.pi), strict=True))
+    postures = np.random.default_rng(0).uniform(lower, upper, (_POSTURES, robot.n))
+    steps = (np.zeros(robot.n), *(postures - robot.vector(robot.rest)))
+    seen = np.array([measure_capsules(at.placements, *packed, np.array(pairs))[:, 0]
+                     for step in steps
+                     if at.move(0.0, robot.integrate(robot.rest, step), np.zeros(robot.n))])
+    apart = (seen[0] > 0.0) & (seen.max(axis=0) >= distance)
+    return [pair for pair, kept in zip(pairs, apart.tolist(), strict=True) if kept]
+
+
+def inseparable_pairs(robot: Robot, distance: float) -> list[str]:
+    """Return the names of the pairs that `separable_pairs` excludes for their proposed capsules."""
+    kept = set(separable_pairs(robot, distance))
+    return [f"{robot.capsules[i].name} to {robot.capsules[j].name}"
+            for i, j in _watched(robot) if (i, j) not in kept]
+
+
+def _watched(robot: Robot) -> list[tuple[int, int]]:
+    """Return the pairs of capsules on joints that are no neighbours and may not touch."""
+    names = ("", *robot.joint_names)
+    apart = {frozenset(pair) for pair in robot.apart}
+    return [(i, j) for i, j in pairs_of_tree(robot.capsules, robot.parents)
+            if frozenset(names[robot.capsules[k].joint] for k in (i, j)) not in apart]

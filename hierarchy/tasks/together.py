@@ -1,7 +1,7 @@
 """Tasks that are made of others: several as one level, and the rows of a set-based one."""
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -11,7 +11,7 @@ from hierarchy.problem import Array
 from hierarchy.records import set_frozen
 from hierarchy.robot import Robot
 from hierarchy.state import State
-from hierarchy.task import Kind, Level, Rows, Task, Writer, Written, in_turn, writer_in_stack
+from hierarchy.task import Level, Rows, Task, Writer, Written, in_turn, writer_in_stack
 
 
 @dataclass(frozen=True)
@@ -58,12 +58,8 @@ class Together(Written):
         """Task and row of each row."""
         return tuple(f"{task.name} {row}" for task in self.tasks for row in task.row_names)
 
-    def error(self, state: State) -> Array:
-        """The errors of the tasks (m,)."""
-        return self.error_reader(state)()
-
     def error_reader(self, state: State) -> Callable[[], Array]:
-        """See `Task.error_reader`."""
+        """See `Task.error_reader`: the errors of the tasks (m,)."""
         readers = [task.error_reader(state) for task in self.tasks]
         return lambda: np.hstack([read() for read in readers])  # of one row maybe a number
 
@@ -101,8 +97,7 @@ class TangentCone(Written):
     """
 
     task: Task
-    name: str = field(init=False, repr=False, compare=False)
-    kind: Kind = field(init=False, repr=False, compare=False, default="inequality")
+    kind = "inequality"
 
     def __post_init__(self) -> None:
         expect("set-based task", self.task, Task, "see hierarchy.tasks")
@@ -123,18 +118,14 @@ class TangentCone(Written):
         """The rate (m,) at which the bound of `task` moves."""
         return self.task.desired_velocity(state)
 
-    def reference_velocity(self, state: State) -> Array:
-        """The least rate (m,): that of the bound, -inf inside."""
-        return np.where(self.error(state) >= 0.0, self.desired_velocity(state), -np.inf)
-
     def writer(self, state: State, level: Level, rows: Rows) -> Writer:
         """See `Task.writer`."""
         self.refuse(level != "velocity", "set-based tasks are defined at velocity level, got "
                     f"level = {level!r}")
-        write_rows = self.task.writer(state, level, rows)
 
-        def write() -> None:
-            write_rows()
-            rows.lower[:], rows.upper[:] = self.reference_velocity(state), np.inf
+        def bound() -> None:
+            inside = self.error(state) < 0.0
+            rows.lower[:] = np.where(inside, -np.inf, self.desired_velocity(state))
+            rows.upper[:] = np.inf
 
-        return write
+        return in_turn(self.task.writer(state, level, rows), bound)

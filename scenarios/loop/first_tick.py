@@ -6,8 +6,7 @@ from math import isfinite
 
 import numpy as np
 
-from hierarchy.tasks.pairs import inseparable_pairs
-from hierarchy.tasks.separation import SelfSeparation
+from hierarchy.tasks.separation import SelfSeparation, inseparable_pairs
 from hierarchy.words import listed
 from scenarios.cell.build import Cell, build
 from scenarios.config import Scenario, ScenarioError

@@ -17,7 +17,7 @@ from hierarchy.errors import RobotError, UnknownNameError
 from hierarchy.robots import files, names
 from hierarchy.robots.from_table import _capsule_inertia
 from hierarchy.robots.table import Link
-from hierarchy.tasks.pairs import separable_pairs
+from hierarchy.tasks.separation import separable_pairs
 from scenarios.cell.robot import make_robot
 from scenarios.config.sections.robot import RobotSection
 

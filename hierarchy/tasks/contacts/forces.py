@@ -8,10 +8,10 @@ from math import inf
 from typing import Annotated, ClassVar
 
 import numpy as np
+from numpy.typing import ArrayLike
 
-from hierarchy.avoidance.body import Points
-from hierarchy.contacts import Contacts, zero_while_open
-from hierarchy.errors import finite_numbers, number
+from hierarchy.contacts import Contact, Contacts, zero_while_open
+from hierarchy.errors import finite_numbers, positive
 from hierarchy.gate import shaped
 from hierarchy.jit import bind, compiled
 from hierarchy.kinematics import less, place
@@ -23,6 +23,7 @@ from hierarchy.task import Level, Rows, Writer, Written, in_turn
 from hierarchy.tasks.joints.joint_limits import JointRows
 
 WRENCH = tuple(f"{kind} {axis}" for kind in ("force", "moment") for axis in "xyz")
+OfContact = tuple[Sequence[str], ArrayLike, ArrayLike, ArrayLike]  # names, rows, lower, upper
 
 
 class ForceTask(Written):
@@ -43,12 +44,28 @@ class ForceTask(Written):
 
 
 class FixedRows(ForceTask):
-    """Rows over forces that do not change with the state. Abstract: needs `fixed`."""
+    """Rows over the forces of each contact, the same at any state. Abstract: needs `of_contact`."""
+
+    @abstractmethod
+    def of_contact(self, contact: Contact) -> OfContact:
+        """Names (r,) of the rows of a contact, over its forces (r, 3 k), and their sides (r,)."""
 
     @property
-    @abstractmethod
-    def fixed(self) -> tuple[Array, Array, Array]:
+    def row_names(self) -> tuple[str, ...]:
+        """Contact and row."""
+        return tuple(f"{contact.name} {row}" for contact in self.contacts.contacts
+                     for row in self.of_contact(contact)[0])
+
+    @property
+    def fixed(self) -> Rows:
         """The rows over the unknowns (m, n + 3 p), their lower and upper sides (m,)."""
+        (A, *sides), end = Rows.empty(self.dimension, self.contacts.unknowns), 0
+        for contact in self.contacts.contacts:
+            names, forces, *given = self.of_contact(contact)
+            own = slice(end, end := end + len(names))
+            A[own, self.contacts.blocks[contact.name]] = forces
+            sides[0][own], sides[1][own] = given
+        return Rows(A, *sides)
 
     def writer(self, state: State, level: Level, rows: Rows) -> Writer:
         """See `Task.writer`."""
@@ -92,32 +109,29 @@ class ContactForce(ForceTask):
 
     def writer(self, state: State, level: Level, rows: Rows) -> Writer:
         """See `Task.writer`."""
-        contact, block = self.contacts[self.contact], self.contacts.blocks[self.contact]
-        first, joints, offsets = (block.start - state.n) // 3, *self.contacts.points
-        of_contact = slice(first, first + len(contact.points))
-        directions = np.vstack([contact.axes[2:] if self.dimension == 1 else np.eye(3)])
-        parameters = (Points(joints[of_contact], offsets[of_contact]), directions,
-                      contact.frame.offset, np.array(self.target, dtype=float), block.start)
+        contact, frame = self.contacts[self.contact], self.contacts[self.contact].frame
+        offsets = np.array([frame.placed(point) for point in contact.points])
+        parameters = (frame.joint, frame.offset, offsets, np.array(self.target, dtype=float),
+                      contact.axes[2:] if self.dimension == 1 else np.eye(3),
+                      self.contacts.blocks[self.contact].start)
         return bind(_write, state.placements, parameters, *rows)
 
 
 @compiled
 def _write(placements, parameters, A, lower, upper):
     # The directions (1 or 3, 3) are those of the rows of the force, the origin is of the moment.
-    points, directions, origin, target, column = parameters
-    T = placements[points.joints[0]]
-    o = place(T, origin)
+    joint, origin, offsets, target, directions, column = parameters
+    T = placements[joint]
     for i in range(len(target)):
-        for c in range(A.shape[1]):
-            A[i, c] = 0.0
+        A[i, :] = 0.0
         lower[i] = upper[i] = target[i]
-    for k in range(len(points.joints)):
+    for k in range(len(offsets)):
         f = column + 3 * k
-        for i in range(directions.shape[0]):
+        for i in range(len(directions)):
             for c in range(3):
                 A[i, f + c] = directions[i, c]
         if len(target) == 6:
-            x, y, z = less(place(T, points.offsets[k]), o)
+            x, y, z = less(place(T, offsets[k]), place(T, origin))
             A[3, f + 1], A[3, f + 2] = -z, y  # the moment r x f
             A[4, f], A[4, f + 2] = z, -x
             A[5, f], A[5, f + 1] = -y, x
@@ -133,17 +147,10 @@ class LeastForce(FixedRows):
     contacts: Contacts
     name: str = "least force"
 
-    @property
-    def row_names(self) -> tuple[str, ...]:
-        """Contact, point and axis of each row."""
-        return tuple(f"{contact.name} point {k + 1} {axis}" for contact in self.contacts.contacts
-                     for k in range(len(contact.points)) for axis in "xyz")
-
-    @property
-    def fixed(self) -> tuple[Array, Array, Array]:
-        """Those of the identity for the forces, and zeros (3 p,), twice."""
-        unit = np.eye(self.contacts.unknowns)[self.contacts.robot.n:]
-        return unit, np.zeros(len(unit)), np.zeros(len(unit))
+    def of_contact(self, contact: Contact) -> OfContact:
+        """A row of the identity for each axis of each point, zero."""
+        names = [f"point {k + 1} {axis}" for k in range(len(contact.points)) for axis in "xyz"]
+        return names, np.eye(len(names)), np.zeros(len(names)), np.zeros(len(names))
 
 
 class TorqueRows(JointRows):
@@ -201,14 +208,10 @@ class TorqueLimits(TorqueRows):
     """
 
     robot: Robot
-    fraction: Annotated[float, partial(number, least=0.0, largest=1.0)] = 1.0
+    fraction: Annotated[float, partial(positive, largest=1.0)] = 1.0
     name: str = "torque limits"
     contacts: Contacts | None = None
     levels = "acceleration", "torque"
-
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        self.refuse(self.fraction == 0.0, f"fraction {self.fraction} is not more than 0")
 
     def bounds(self, state: State) -> tuple[Array, Array]:
         """The limits, at any state."""

@@ -12,7 +12,7 @@ from hierarchy.contacts import Contact, Contacts
 from hierarchy.problem import Array
 from hierarchy.state import State
 from hierarchy.task import Level, Rows, Writer, in_turn
-from hierarchy.tasks.contacts.forces import FixedRows
+from hierarchy.tasks.contacts.forces import FixedRows, OfContact
 
 _SLOW = 0.01      # [m/s] below which the friction of a sliding point falls to zero
 _NOTHING = 1e-6   # [N] of normal force that counts as none
@@ -50,37 +50,30 @@ class Friction(FixedRows):
         self.refuse(not 0.0 <= self.least < self.largest, "no normal force is pushing and lies "
                     f"between least {self.least} N and largest {self.largest} N")
 
-    @property
-    def row_names(self) -> tuple[str, ...]:
-        """Contact, point and face of each row."""
-        rows, names = [*(f"face {i + 1}" for i in range(self.faces)), "normal force"], list[str]()
-        for contact in self.contacts.contacts:
-            names += [f"{contact.name} point {k + 1} {row}" for k in range(len(contact.points))
-                      for row in rows]
-            names += [f"{contact.name} load"] * _summed(contact)
-        return tuple(names)
-
-    @property
-    def fixed(self) -> tuple[Array, Array, Array]:
-        """The rows over the unknowns (m, n + 3 p), their lower and upper sides (m,), (m,) [N].
+    def of_contact(self, contact: Contact) -> OfContact:
+        """Faces and normal force of each point; the first two tangents are normal to faces.
 
         A `least` of zero has no side: opposite faces together already say that the point pushes,
         and a row that says it again is a tie at the tip of the pyramid.
         """
-        parts, low, up = list[Array](), list[float](), list[float]()
-        for contact in self.contacts.contacts:
-            own, count, summed = self._of(contact), len(contact.points), _summed(contact)
-            part = np.zeros((len(own), self.contacts.unknowns))
-            part[:, self.contacts.blocks[contact.name]] = own
-            parts.append(part)
-            low += [*[0.0] * self.faces, self.least or -inf] * count + [-inf] * summed
-            up += [*[inf] * self.faces, self.largest] * count + [inf] * summed
-        return np.vstack(parts), np.array(low), np.array(up)
+        faces, count = self.faces, len(contact.points)
+        slope = contact.friction * cos(pi / faces)
+        angles = [2.0 * pi * i / faces for i in range(faces)]
+        local = [*([-cos(angle), -sin(angle), slope] for angle in angles), [0.0, 0.0, 1.0]]
+        rows = np.kron(np.eye(count), np.array(local) @ contact.axes)
+        each = [*(f"face {i + 1}" for i in range(faces)), "normal force"]
+        names = [f"point {k + 1} {row}" for k in range(count) for row in each]
+        low = [*[0.0] * faces, self.least or -inf] * count
+        up = [*[inf] * faces, self.largest] * count
+        if contact.open and contact.is_surface:  # all points open together
+            rows = np.vstack([rows, np.tile(contact.axes[2], count)])
+            names, low, up = [*names, "load"], [*low, -inf], [*up, inf]
+        return names, rows, low, up
 
     def writer(self, state: State, level: Level, rows: Rows) -> Writer:
         """See `Task.writer`."""
         contacts, writers = self.contacts.contacts, [super().writer(state, level, rows)]
-        parts = rows.split([len(self._of(contact)) for contact in contacts])
+        parts = rows.split([len(self.of_contact(contact)[0]) for contact in contacts])
         for k, (contact, own) in enumerate(zip(contacts, parts, strict=True)):
             if contact.open:
                 writers.append(partial(self._ramp, k, state, own.lower, own.upper))
@@ -121,20 +114,6 @@ class Friction(FixedRows):
             A[row] = tangent + share * contact.axes[2]
             low[row] = up[row] = 0.0
 
-    def _of(self, contact: Contact) -> Array:
-        """Rows (r, 3 k) of one contact; the first two tangents are normal to faces."""
-        angles = [2.0 * pi * i / self.faces for i in range(self.faces)]
-        slope = contact.friction * cos(pi / self.faces)
-        local = [*([-cos(angle), -sin(angle), slope] for angle in angles), [0.0, 0.0, 1.0]]
-        count, normal = len(contact.points), contact.axes[2]
-        rows = np.kron(np.eye(count), np.array(local) @ contact.axes)
-        return np.vstack([rows, np.tile(normal, (_summed(contact), count))])
-
-
-def _summed(contact: Contact) -> int:
-    """Return the number of rows over all points' normal force: one if several open together."""
-    return int(bool(contact.open) and contact.is_surface)
-
 
 @dataclass(frozen=True)
 class CentreOfPressure(FixedRows):
@@ -156,7 +135,7 @@ class CentreOfPressure(FixedRows):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        surfaces = self._surfaces()
+        surfaces = [contact for contact in self.contacts.contacts if contact.is_surface]
         self.refuse(not self.contacts.contacts, "there are no contacts")
         self.refuse(not surfaces, "no contact is a surface")
         for contact in surfaces:
@@ -165,33 +144,19 @@ class CentreOfPressure(FixedRows):
                         f"{contact.name!r} is not from 0 to less than {widest:.4g}, the distance "
                         "of its middle from an edge")
 
-    @property
-    def row_names(self) -> tuple[str, ...]:
-        """Contact and edge of each row."""
-        return tuple(f"{contact.name} edge {i + 1}" for contact in self._surfaces()
-                     for i in range(len(_distances(contact))))
-
-    @property
-    def fixed(self) -> tuple[Array, Array, Array]:
-        """The rows over the unknowns (m, n + 3 p) [m], zero and infinity (m,)."""
-        rows = []
-        for contact in self._surfaces():
-            block = self.contacts.blocks[contact.name]
-            for distances in _distances(contact):
-                row = np.zeros(self.contacts.unknowns)
-                row[block] = np.outer(distances - self.margin, contact.axes[2]).ravel()
-                rows.append(row)
-        return np.array(rows), np.zeros(len(rows)), np.full(len(rows), inf)
-
-    def _surfaces(self) -> list[Contact]:
-        return [contact for contact in self.contacts.contacts if contact.is_surface]
+    def of_contact(self, contact: Contact) -> OfContact:
+        """A row for each edge of a sole [m], at least zero."""
+        levers = _distances(contact) - self.margin
+        return ([f"edge {i + 1}" for i in range(len(levers))], np.kron(levers, contact.axes[2]),
+                np.zeros(len(levers)), np.full(len(levers), inf))
 
 
 def _distances(contact: Contact) -> Array:
     """Distance (edges, k) [m] of each point from each edge of the hull, inward positive."""
     points = np.array(contact.points, dtype=float) @ contact.sole[:2].T
     different = np.unique(points.round(6), axis=0, return_index=True)[1]  # to 1 um
-    return np.array([(points - start) @ inward for start, inward in _edges(points[different])])
+    edges = [(points - start) @ inward for start, inward in _edges(points[different])]
+    return np.array(edges).reshape(-1, len(points))
 
 
 def _edges(points: Array) -> Iterator[tuple[Array, Array]]:

@@ -1,7 +1,7 @@
 """Couplings of joints: gears, mimic joints, fingers that close together."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from fractions import Fraction
 from itertools import zip_longest
 from math import lcm, pi
@@ -66,7 +66,6 @@ class JointCoupling(_Coupling):
     damping: float = 20.0
     gain: float = 10.0
     name: str = "coupling"
-    terms: Terms = field(init=False, repr=False, compare=False)
     straight = True
 
     def __post_init__(self) -> None:
@@ -97,7 +96,6 @@ class FollowedJoints(_Coupling):
     damping: float = 20.0
     gain: float = 10.0
     name: str = "couplings"
-    terms: Terms = field(init=False, repr=False, compare=False)
 
     def __post_init__(self) -> None:
         super().__post_init__()

@@ -5,7 +5,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import ArrayLike
 
-from hierarchy.errors import HierarchyError, brief, finite_numbers, naming, number, positive
+from hierarchy.errors import HierarchyError, brief, finite_numbers, naming, positive
 from hierarchy.gate import array_of
 from hierarchy.jit import bind
 from hierarchy.kinematics import write_identity
@@ -78,10 +78,10 @@ class JointLimits(JointRows):
         speed = robot.velocity_limit.copy()
         rate = np.append(np.full(robot.actuated, acceleration.max(initial=-np.inf)),
                          np.broadcast_to(acceleration, n))
-        self.refuse(self._limits_base and robot.base == "fixed", f"robot {robot.name!r} has a "
-                    "fixed base, which has no speed to limit")
         for what, limit in (("base_speed", speed), ("base_acceleration", rate)):
             if (given := getattr(self, what)) is not None:
+                self.refuse(robot.base == "fixed", f"robot {robot.name!r} has a fixed base, which "
+                            "has no speed to limit")
                 limit[:6] = np.repeat(finite_numbers(f"task {self.name!r}: {what}", given, 2), 3)
         # Coupled joints stop together: as the slowest of them. Each pass reaches one joint further.
         for one in robot.coupled * (1 + len(robot.coupled)):
@@ -97,11 +97,8 @@ class JointLimits(JointRows):
     @property
     def first(self) -> int:
         """The velocity of the first row: 0, or that of the first joint behind a floating base."""
-        return 0 if self._limits_base else self.robot.actuated
-
-    @property
-    def _limits_base(self) -> bool:
-        return self.base_speed is not None or self.base_acceleration is not None
+        of_joints = self.base_speed is None and self.base_acceleration is None
+        return self.robot.actuated if of_joints else 0
 
     def box(self, state: State, level: Level) -> tuple[Array, Array]:
         """Return the least and greatest command (n,), (n,) at a state; the box is never empty."""
@@ -179,8 +176,7 @@ class StepLimits(JointRows):
     def __post_init__(self) -> None:
         positive(f"task {self.name!r}: period [s]", self.period)
         gain = APPROACH / self.period if self.gain is None else self.gain
-        number(f"task {self.name!r}: gain [1/s]", gain, largest=1.0 / self.period)
-        positive(f"task {self.name!r}: gain [1/s]", gain)
+        positive(f"task {self.name!r}: gain [1/s]", gain, 1.0 / self.period)
         set_frozen(self, gain=gain)
         super().__post_init__()
         fastest = self.robot.velocity_limit

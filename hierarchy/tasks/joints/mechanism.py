@@ -6,7 +6,6 @@ these rows stand at the top of a stack.
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-from functools import cached_property
 from typing import final
 
 import numpy as np
@@ -16,7 +15,7 @@ from hierarchy.errors import expect, positive
 from hierarchy.problem import Array
 from hierarchy.robot import Robot
 from hierarchy.state import State
-from hierarchy.task import Level, Rows, Task, Writer, Written
+from hierarchy.task import Level, Rows, Task, Writer, Written, in_turn
 from hierarchy.tasks.joints.coupling import FollowedJoints
 from hierarchy.tasks.pose import RelativePose
 from hierarchy.tasks.together import Together
@@ -96,16 +95,14 @@ class ClosedChains(Written):
     def writer(self, state: State, level: Level, rows: Rows) -> Writer:
         """See `Task.writer`."""
         whole = Rows.empty(self.dimension, state.n)
-        write_whole = self.whole.writer(state, level, whole)
 
-        def write() -> None:
-            write_whole()
+        def reduce() -> None:
             V, sizes, c = self.parts(whole.A, whole.lower)
             rows.A[:], rows.lower[:] = 0.0, 0.0
             rows.A[:len(V)], rows.lower[:len(V)] = V, c / sizes
             rows.upper[:] = rows.lower
 
-        return write
+        return in_turn(self.whole.writer(state, level, whole), reduce)
 
     def parts(self, J: Array, side: Array) -> tuple[Array, Array, Array]:
         """Return the independent part of rows J x = side, (m, n) and (m,): V, sizes and c.
@@ -133,6 +130,10 @@ class Mechanism:
         self._robot, self._state = robot, State(robot)
         self._tasks = [task if isinstance(task, ClosedChains) else ClosedChains(task)
                        for task in model_rows(robot) if isinstance(task, ClosedChains | Together)]
+        for task in self._tasks:
+            # To bind what writes takes 1 ms, to write 1 us: closing a mechanism asks ten times.
+            self._made = Rows.empty(task.dimension, robot.n)
+            self._write = task.whole.writer(self._state, "velocity", self._made)
 
     def __bool__(self) -> bool:
         return bool(self._tasks)
@@ -199,20 +200,9 @@ class Mechanism:
 
     def _rows(self, q: Array) -> tuple[Array, Array]:
         """Jacobian (m, n) and error (m,) at q."""
-        write, rows = self._written
         self._state.move(0.0, q, self._state.v)
-        write()
-        return rows.A.copy(), rows.lower / self._tasks[0].whole.tasks[0].gain
-
-    @cached_property
-    def _written(self) -> tuple[Writer, Rows]:
-        """What writes the rows at velocity level, and the rows.
-
-        To bind it takes 1 ms, and to write them 1 us: closing a mechanism asks ten times.
-        """
-        whole = self._tasks[0].whole
-        rows = Rows.empty(whole.dimension, self._robot.n)
-        return whole.writer(self._state, "velocity", rows), rows
+        self._write()
+        return self._made.A.copy(), self._made.lower / self._tasks[0].whole.tasks[0].gain
 
     def _solved(self, J: Array, side: Array, damping: float) -> Array:
         """Return the x (n,) that makes |J x - side|^2 + damping |x|^2 least, at the scales of J."""

@@ -4,11 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
-from functools import partial
 from typing import Literal
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from hierarchy.errors import finite_numbers, naming
 from hierarchy.jit import bind, compiled
@@ -107,27 +106,16 @@ class Posture(Measured):
         positions = state.q[robot.nq - m:] if _plain(robot) else np.zeros(m)
         return _posture, (positions, robot.actuated)
 
-    @property
-    def columns(self) -> NDArray[np.int64]:
-        """A coordinate for each row."""
-        return np.arange(self.dimension)
-
     def follow(self, state: State, goal: Array) -> Callable[[float], object] | None:
         """See `Measured.follow`: the goal is the target, or the step there."""
         robot, rest, target, m = state.robot, self.rest, self.target, self.dimension
         place = goal[0, :m]
-
-        def move(t: float) -> None:
-            place[:] = pin.difference(robot.model, state.q, rest)[robot.actuated:]  # both sound
-
         if not _plain(robot):
-            return move
+            return lambda t: np.copyto(place, pin.difference(  # both sound
+                robot.model, state.q, rest)[robot.actuated:])
         place[:] = rest[robot.nq - m:]
-        return partial(_read, target, place) if isinstance(target, np.ndarray) else None
-
-
-def _read(target: Array, place: Array, t: float) -> None:
-    place[:] = target[len(target) - len(place):]
+        aim = target[len(target) - m:] if isinstance(target, np.ndarray) else None
+        return None if aim is None else lambda t: np.copyto(place, aim)
 
 
 def _plain(robot: Robot) -> bool:

@@ -10,7 +10,7 @@ from hierarchy.contacts import Contacts
 from hierarchy.problem import Array
 from hierarchy.robot import Frame
 from hierarchy.tasks import Mechanism
-from hierarchy.tasks.pairs import Pairs, separable_pairs
+from hierarchy.tasks.separation import separable_pairs
 from scenarios.config.sections import ScenarioError, naming
 
 
@@ -39,7 +39,7 @@ class References:
         moved = self.robot.configuration(joints, q)
         return Mechanism(self.robot).closed(moved, joints) if joints else moved
 
-    def pairs(self, distance: float) -> Pairs:
+    def pairs(self, distance: float) -> list[tuple[int, int]]:
         """Return the pairs of capsules to keep at a distance [m]; ScenarioError if none can be."""
         pairs = separable_pairs(self.robot, distance)
         if not pairs:
