@@ -251,7 +251,11 @@ def _judged(levels: list[_Rows], gap: Array, reach: float, tolerance: float, par
         left, level = _residual(cone, level, tolerance * reach)
         stationarity[k] = left / reach
         cone.add(level)
-    return stationarity, _projected(gap, cone, tolerance * reach) / reach
+    C, f = cone.rows.T, cone.Z.T @ gap  # the step left is the projection of -gap on the polar cone
+    unknown = _ROUNDING / cone.thinnest + cone.angle
+    nearest = _balanced(C, np.ones_like(C), f, np.full(len(f), norm(gap)), unknown,
+                        1e-3 * tolerance * reach)
+    return stationarity, nearest / reach
 
 
 class _Rows(NamedTuple):
@@ -313,8 +317,7 @@ class _NormalCone:
         if level.fixed.any():
             self.Z, pivot, angle = _complement(self.Z, level.unit[level.fixed], self.parallel)
             self.thinnest, self.angle = min(self.thinnest, pivot), max(self.angle, angle)
-        if level.upper.any() or level.lower.any():
-            self._kept = np.vstack([self._kept, level.unit[level.upper], -level.unit[level.lower]])
+        self._kept = np.vstack([self._kept, _on_sides(level, level.size)[0]])
         seen = self._kept @ self.Z
         left = norm(seen, axis=1)
         faint, free = left[left <= self.parallel], left > self.parallel
@@ -360,19 +363,19 @@ def _residual(cone: _NormalCone, level: _Rows, enough: float) -> tuple[float, _R
 def _least_change(cone: _NormalCone, level: _Rows, Z: Array, size: Array, judged: Mask,
                   enough: float) -> float:
     """Return the residual of (1) in coordinates of Z (n, p), for the judged rows of a level."""
-    view = _View.of(level.unit[judged] @ Z, size[judged], cone.parallel)
     own, own_size, own_t = _on_sides(level, size)
-    C, terms = view.weighted(np.vstack([cone.rows @ (cone.Z.T @ Z),
-                                        (own @ Z) * own_size[:, None]**2]))
-    unseen = _independent(C[view.rank:], terms[view.rank:], cone.parallel)
-    C, terms = np.vstack([C[:view.rank], unseen]), terms[:view.rank + len(unseen)]
+    cone_rows = np.vstack([cone.rows @ (cone.Z.T @ Z), (own @ Z) * own_size[:, None]**2])
+    C, terms, Q, thinnest, angle = _weighted(level.unit[judged] @ Z, size[judged], cone_rows,
+                                             cone.parallel)
+    rank = Q.shape[1]
+    unseen = _independent(C[rank:], terms[rank:], cone.parallel)
+    C, terms = np.vstack([C[:rank], unseen]), terms[:rank + len(unseen)]
     held = np.eye(len(own_t), C.shape[1], len(cone.rows))
-    none, t = np.zeros(len(C) - view.rank), level.t[judged]
-    f = np.concatenate([view.Q.T @ t, none, -np.maximum(own_t, 0.0)])
-    sizes = np.concatenate([np.abs(view.Q).T @ np.abs(t), none, np.zeros(len(own_t))])
-    unknown = np.full(len(f), _ROUNDING / min(cone.thinnest, view.thinnest)
-                      + max(cone.angle, view.angle))
-    beyond = slice(view.rank, len(C))  # up to the angle at which rows count as dependent
+    none, t = np.zeros(len(unseen)), level.t[judged]
+    f = np.concatenate([Q.T @ t, none, -np.maximum(own_t, 0.0)])
+    sizes = np.concatenate([np.abs(Q).T @ np.abs(t), none, np.zeros(len(own_t))])
+    unknown = np.full(len(f), _ROUNDING / min(cone.thinnest, thinnest) + max(cone.angle, angle))
+    beyond = slice(rank, len(C))  # up to the angle at which rows count as dependent
     unknown[beyond] = np.maximum(unknown[beyond], cone.parallel)
     return _balanced(np.vstack([C, held]), np.vstack([terms, held]), f, sizes, unknown,
                      1e-3 * enough)
@@ -419,13 +422,6 @@ def _on_sides(level: _Rows, size: Array) -> tuple[Array, Array, Array]:
             np.concatenate([size[up], size[low]]), np.concatenate([level.t[up], -level.t[low]]))
 
 
-def _projected(gap: Array, cone: _NormalCone, enough: float) -> float:
-    """Return the length of the projection of -gap (n,) on the polar cone, in coordinates of Z."""
-    C, f = cone.rows.T, cone.Z.T @ gap
-    return _balanced(C, np.ones_like(C), f, np.full(len(f), norm(gap)),
-                     _ROUNDING / cone.thinnest + cone.angle, 1e-3 * enough)
-
-
 def _balanced(C: Array, terms: Array, f: Array, size: Array, unknown: Array | float,
               enough: float) -> float:
     """Return the least |C z + f| for z >= 0, ignoring entries within the unknown share of terms.
@@ -468,55 +464,29 @@ def _outside(rows: Array, basis: Array) -> Array:
     return rows
 
 
-class _View(NamedTuple):
-    """The part of p coordinates that the rows of a level see, large rows first.
+def _weighted(P: Array, size: Array, rows: Array, parallel: float
+              ) -> tuple[Array, Array, Array, float, float]:
+    """Return the effect of rows (k, p) on the balance of a level, as columns (p, k), in lengths.
 
-    size (m,) : of the rows.
-    Q (m, rank) : orthonormal; |Q^T t| is the least change of t without help from the cone.
-    directions (p, rank), rest (p, p - rank) : bases of the directions that the rows see, and of
-        the others.
+    P (m, p) are projections of the unit rows of the level, for rows of these sizes (m,). What these
+    see comes first, large rows first. Also returns the size of the terms summed in each entry, to
+    which rounding is relative; Q (m, rank), orthonormal, for which |Q^T t| is the least change of t
+    without help from the cone; and smallest pivot and error of the span of P.
     """
-
-    size: Array
-    Q: Array
-    R: Array
-    order: NDArray[np.int64]
-    directions: Array
-    rest: Array
-    thinnest: float
-    angle: float
-    parallel: float
-
-    @property
-    def rank(self) -> int:
-        """Number of directions that the rows see."""
-        return int(self.Q.shape[1])
-
-    @staticmethod
-    def of(P: Array, size: Array, parallel: float) -> _View:
-        """Factorise rows P (m, p), projections of unit rows that represent rows of these sizes."""
-        V, T, thinnest, angle, rank = _graded(P, size, parallel)
-        by_size = np.argsort(-size, kind="stable")
-        sorted_Q, R, order = _qr((T[:rank] * size**2).T[by_size])
-        Q = np.empty((len(size), rank))
-        Q[by_size] = sorted_Q[:, :rank]
-        return _View(size, Q, R[:rank], order, V[:, :rank], V[:, rank:], thinnest, angle,
-                     parallel)
-
-    def weighted(self, rows: Array) -> tuple[Array, Array]:
-        """Return the effect of rows (k, p) on a balance, as columns (p, k) in lengths of the level.
-
-        Also returns the size of the terms summed in each entry, to which rounding is relative.
-        """
-        outside, length = rows @ self.rest, norm(rows, axis=1)
-        seen = rows @ self.directions
-        seen[np.abs(seen) <= _ROUNDING * length[:, None]] = 0.0
-        inside = _solve_triangular(self.R, seen[:, self.order].T, trans=1)
-        turned = self.parallel * (length + np.abs(self.Q @ inside).T @ self.size**2)
-        outside[norm(outside, axis=1) <= turned] = 0.0  # in the span, if each row turns by so much
-        weight = _UNSEEN / float(np.abs(np.diagonal(self.R)).min(initial=_UNSEEN))
-        return (np.vstack([inside, weight * outside.T]),
-                np.vstack([np.abs(inside), np.tile(weight * length, (outside.shape[1], 1))]))
+    V, T, thinnest, angle, rank = _graded(P, size, parallel)
+    by_size = np.argsort(-size, kind="stable")
+    sorted_Q, R, order = _qr((T[:rank] * size**2).T[by_size])
+    Q, R = np.empty((len(size), rank)), R[:rank]
+    Q[by_size] = sorted_Q[:, :rank]
+    seen, outside, length = rows @ V[:, :rank], rows @ V[:, rank:], norm(rows, axis=1)
+    seen[np.abs(seen) <= _ROUNDING * length[:, None]] = 0.0
+    inside = _solve_triangular(R, seen[:, order].T, trans=1)
+    turned = parallel * (length + np.abs(Q @ inside).T @ size**2)
+    outside[norm(outside, axis=1) <= turned] = 0.0  # in the span, if each row turns by so much
+    weight = _UNSEEN / float(np.abs(np.diagonal(R)).min(initial=_UNSEEN))
+    return (np.vstack([inside, weight * outside.T]),
+            np.vstack([np.abs(inside), np.tile(weight * length, (outside.shape[1], 1))]),
+            Q, thinnest, angle)
 
 
 def _graded(P: Array, size: Array, parallel: float) -> tuple[Array, Array, float, float, int]:
@@ -639,15 +609,12 @@ def _least_squares(D: Array, b: Array, free: Mask) -> tuple[Array, Array]:
     Heavy rows come first. The residual comes from Q, not from a difference, so the small residual
     of a heavy row is as accurate as the rest (Cox, Higham 1998).
     """
-    s = np.zeros(D.shape[1])
-    if not free.any():
-        return s, b.copy()
-    chosen = D[:, free]
+    s, chosen = np.zeros(D.shape[1]), D[:, free]
     Q, R, order = _qr(chosen)
     inside, diagonal = Q.T @ b, np.abs(np.diagonal(R))
     depth = len(diagonal)
     rounding = _SMALL * np.minimum(norm(chosen, axis=0)[order[:depth]],  # of columns and rows
-                                   np.abs(chosen).max(axis=1)[:depth])
+                                   np.abs(chosen).max(axis=1, initial=0.0)[:depth])
     pivots = diagonal > rounding
     rank = len(pivots) if pivots.all() else int(np.argmin(pivots))
     s[np.flatnonzero(free)[order[:rank]]] = _solve_triangular(R[:rank, :rank], inside[:rank])

@@ -12,12 +12,12 @@ import numpy as np
 from numpy.linalg import norm
 from numpy.typing import ArrayLike
 
-from hierarchy.errors import HierarchyError, check_name, expect
-from hierarchy.gate import Sizes, check_finite, check_rows, level_names, readable, shaped
+from hierarchy.errors import HierarchyError, check_name, expect, refuse
+from hierarchy.gate import Sizes, array_of, check_finite, check_rows, level_names, readable, shaped
 from hierarchy.problem import Array, Hierarchy
 from solvers.kernels.staircase import solve_by_staircase
 from solvers.kernels.tolerances import CANCELLED
-from solvers.resolver import Resolution
+from solvers.resolver import Resolution, place_of
 from solvers.resolvers.tpm import Tpm, task_priority_matrix
 from solvers.status import INACCURATE, SOLVED, Status
 from solvers.workspace import entry, run
@@ -215,7 +215,9 @@ class Factorization:
         Raises HierarchyError: a wrong shape or an entry that is not finite; names level, row and
         value.
         """
-        (C, sizes), b, q0 = self._ordered, self._packed(targets), self._reference(reference)
+        (C, sizes), b = self._ordered, self._packed(targets)
+        q0 = np.zeros(self._n) if reference is None else shaped("reference", reference, (self._n,))
+        check_finite("reference", q0)
         y0 = self._Q @ q0
         y = y0.copy()
         code = run(entry(solve_by_staircase), C, b, b, sizes, y, self._settings._settings)
@@ -224,13 +226,16 @@ class Factorization:
         x = q0 + (y - y0) @ self._Q  # (14)
         if code == SOLVED and np.isfinite(x).all():
             return Resolution(x)
-        self._check_targets(b)
+        for i in np.flatnonzero(~np.isfinite(b))[:1]:
+            h = Hierarchy.trusted(self.rows, b, b, self.sizes, names=self.names)
+            raise HierarchyError(f"{place_of(h, i)}: target is {b[i]}")
         return Resolution(np.zeros(self._n), Status.NUMERICAL_FAILURE)
 
     def hierarchy(self, targets: Targets, reference: ArrayLike | None = None) -> Hierarchy:
         """Return the problem in the current order, for `certify` or another resolver."""
-        b = self._packed(targets)
-        return Hierarchy(self.rows, b, b.copy(), self.sizes, self._reference(reference), self.names)
+        b, q0 = self._packed(targets), None if reference is None else array_of("reference",
+                                                                               reference)
+        return Hierarchy(self.rows, b, b.copy(), self.sizes, q0, self.names)
 
     # -- internals --------------------------------------------------------------------------------
 
@@ -288,13 +293,6 @@ class Factorization:
         check_rows(name, block, np.zeros(len(block)), np.zeros(len(block)))
         return block
 
-    def _reference(self, reference: ArrayLike | None) -> Array:
-        if reference is None:
-            return np.zeros(self._n)
-        q0 = shaped("reference", reference, (self._n,))
-        check_finite("reference", q0)
-        return q0.copy()
-
     def _packed(self, targets: Targets) -> Array:
         """Return b (m,) in the current order."""
         if isinstance(targets, np.ndarray):
@@ -303,28 +301,17 @@ class Factorization:
                 raise HierarchyError(f"targets have shape {targets.shape}, expected ({m},)")
             return readable("targets", targets)
         if isinstance(targets, Mapping):
-            targets = self._in_order(targets)
+            for name in targets:
+                self._place(name)
+            for name in self.names:
+                refuse(name not in targets, f"{name}: no target given")
+            targets = [targets[name] for name in self.names]
         expect("targets", targets, Sequence, "give b (m,), or b_k (m_k,) of each level")
         if len(targets) != len(self._levels):
             raise HierarchyError(f"{len(targets)} targets for {len(self._levels)} levels")
         return np.concatenate([np.empty(0), *(
             shaped(f"{level.name}: b", b, (len(level.A),))
             for level, b in zip(self._levels, targets, strict=True))])
-
-    def _check_targets(self, b: Array) -> None:
-        """Raise a HierarchyError that names the level and row of a target that is not finite."""
-        for (i,) in np.argwhere(~np.isfinite(b))[:1]:
-            k = int(np.searchsorted(np.cumsum(self.sizes), i, side="right"))
-            raise HierarchyError(f"{self.names[k]}, row {i - sum(self.sizes[:k])}: target is "
-                                 f"{b[i]}")
-
-    def _in_order(self, targets: Mapping[str, ArrayLike]) -> list[ArrayLike]:
-        for name in targets:
-            self._place(name)
-        for name in self.names:
-            if name not in targets:
-                raise HierarchyError(f"{name}: no target given")
-        return [targets[name] for name in self.names]
 
 
 def _unit(A: Array) -> float:

@@ -102,10 +102,11 @@ def prove(h: Hierarchy, candidates: Iterable[ArrayLike], unclear: float = UNCLEA
             tried: set[bytes] = set()
             for x, band in product(points, _BANDS):
                 rows = _Rows.at(h, x, band)
-                key = rows.key(int(h.offsets[count]))
-                if key in tried:
+                key = np.vstack([rows.pulled, rows.on, rows.above & ~rows.equal])
+                said = key[:, :int(h.offsets[count])].tobytes()
+                if said in tried:
                     continue
-                tried.add(key)
+                tried.add(said)
                 with suppress(_NoProofError):
                     return _Attempt(h, rows, None if complete else x, count, unclear).proof()
     return Proof(np.full(h.n, np.nan), np.full(levels, np.nan), 0, levels + 1, 0.0, 0.0)
@@ -131,11 +132,6 @@ class _Rows(NamedTuple):
         pulled = seen & (equal | (over > reach) | (under > reach))
         on = seen & ~pulled & (np.maximum(over, under) >= -reach)
         return _Rows(seen, equal, pulled, on, (pulled | on) & (over >= under))
-
-    def key(self, m: int) -> bytes:
-        """Return the classification of the first m rows as bytes."""
-        whole = np.vstack([self.pulled, self.on, self.above & ~self.equal])
-        return whole[:, :m].tobytes()
 
 
 @final
@@ -210,16 +206,12 @@ class _Attempt:
     def _check_sides(self) -> None:
         """Check that each row is where it was assumed to be."""
         value = self.A @ self.x
-        for i in range(self.h.offsets[self.count]):
-            if not self.seen[i]:
-                continue
-            level, length = int(self.level[i]), self.norm[i] * self.reach
+        for i in np.flatnonzero((self.seen & ~self.equal)[:self.h.offsets[self.count]]):
+            level, beyond = int(self.level[i]), self.t[i] / (self.norm[i] * self.reach)
             if self.on[i]:
-                self.shift = self._used(abs(self.t[i]) / length, self.shift, level)
-            elif self.equal[i]:
-                continue
+                self.shift = self._used(abs(beyond), self.shift, level)
             elif self.pulled[i]:
-                beyond = self.t[i] / length if self.above[i] else -self.t[i] / length
+                beyond = beyond if self.above[i] else -beyond
                 _demand(beyond > 0)
                 if beyond < self.unclear:
                     self._unclear_below(level)

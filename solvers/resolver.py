@@ -143,7 +143,8 @@ class Resolver(ABC):
     def can_resolve(self, required: Handles) -> bool:
         """Whether the resolver accepts rows of the required kind."""
         check_name("kind of rows", required, _KINDS)
-        return _KINDS.index(required) <= _KINDS.index(self.handles)
+        both = required, self.handles
+        return required in ("equalities", self.handles) or both == ("bounds", "inequalities")
 
     @property
     def label(self) -> str:

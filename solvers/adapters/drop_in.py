@@ -46,7 +46,7 @@ def answer(solver: str | Resolver, settings: dict[str, Any], damping: float, tol
 def _at_once(resolver: Hcod, levels: Any, tolerance: float) -> Array | None:
     """Return what `_solved` does without making a Hierarchy, or None where that has more to say."""
     x = levels.reference.copy()
-    solved = solve_exactly(levels, x, np.zeros(3 * levels.count + 3), resolver._settings) == SOLVED
+    solved = solve_exactly(levels, x, np.zeros(3 * levels.count + 3), resolver) == SOLVED
     held = largest_violation(levels.A, *levels.sides, x, 0, levels.always) <= tolerance
     return x if solved and held else None
 

@@ -9,20 +9,13 @@ for a rotation that is none.
 
 from __future__ import annotations
 
+from contextlib import suppress
 from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from hierarchy.errors import (
-    HierarchyError,
-    UnknownNameError,
-    check_name,
-    finite_numbers,
-    number,
-    positive,
-    refuse,
-)
+from hierarchy.errors import HierarchyError, check_name, finite_numbers, number, positive, refuse
 from hierarchy.gate import array_of, check_rotation
 from hierarchy.problem import Array
 
@@ -123,11 +116,11 @@ def limit_level(model: MjModel, data: MjData, period: float, velocity: float | A
 def _index(model: MjModel, name: str, kind: str) -> int:
     check_name("kind of frame", kind, KINDS)
     named = getattr(model, kind)
-    try:
+    with suppress(KeyError, TypeError):
         return int(named(name).id)
-    except (KeyError, TypeError):
-        names = [named(i).name for i in range(getattr(model, f"n{kind}"))]
-        raise UnknownNameError(kind, name, [known for known in names if known]) from None
+    names = [named(i).name for i in range(getattr(model, f"n{kind}"))]
+    check_name(kind, name, [known for known in names if known])
+    return names.index(name)
 
 
 def _gain(value: float) -> float:

@@ -133,10 +133,14 @@ def packed(configuration: Configuration, tasks: Tasks, dt: float, limits: Iterab
            barriers: Iterable[Barrier] | None, constraints: Iterable[displacements.Task] | None,
            damping: float | None, solve: Solve | None) -> Packed:
     """Return the levels of `hierarchy`, which takes the same arguments, as they were packed."""
-    given, n = list(barriers or ()), configuration.model.nv
+    given, model = list(barriers or ()), configuration.model
+    if limits is None:
+        shipped = (model.configuration_limit, model.velocity_limit,
+                   getattr(model, "floating_base_velocity_limit", None))
+        limits = [limit for limit in shipped if limit is not None]
     found = [(type(one).__name__, one.compute_qp_inequalities(configuration, dt))
-             for one in (*(_limits_of_model(configuration) if limits is None else limits), *given)]
-    pull = None if damping is None else Pull(damping, np.zeros(n))
+             for one in (*limits, *given)]
+    pull = None if damping is None else Pull(damping, np.zeros(model.nv))
     for barrier in given:
         if not barrier.safe_displacement_gain:
             continue
@@ -149,7 +153,7 @@ def packed(configuration: Configuration, tasks: Tasks, dt: float, limits: Iterab
                                       H[0, 0], 0.0)
         centre = pull.weight * pull.centre - c / dt
         pull = Pull(weight, centre / weight if weight > 0.0 else pull.centre)
-    return Packed(configuration, partial(_joints, configuration.model), n, dt,
+    return Packed(configuration, partial(_joints, model), model.nv, dt,
                   [(name, *pair) for name, pair in found if pair is not None],
                   list(constraints or ()), tasks, pull, solve=solve)
 
@@ -159,10 +163,3 @@ def _joints(model: Any) -> list[str]:
     return [f"{name} {i + 1}" if joint.nv > 1 else str(name)
             for name, joint in zip(list(model.names)[1:], list(model.joints)[1:], strict=True)
             for i in range(joint.nv)]
-
-
-def _limits_of_model(configuration: Configuration) -> list[Limit]:
-    model = configuration.model
-    found = (model.configuration_limit, model.velocity_limit,
-             getattr(model, "floating_base_velocity_limit", None))
-    return [limit for limit in found if limit is not None]

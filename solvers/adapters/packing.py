@@ -7,9 +7,11 @@ of G or J, then h or e, and of a task its cost, gain and lm_damping.
 
 import numpy as np
 
-from hierarchy.jit import compiled, inlined
+from hierarchy.jit import compiled, inlined, inner_product
 from solvers.kernels.active_set.tableau import reflect_columns
-from solvers.kernels.linalg.space import fill
+from solvers.kernels.box import narrow
+from solvers.kernels.linalg.rows import all_finite, only_entry
+from solvers.kernels.linalg.space import assign, fill
 from solvers.kernels.tolerances import NEGLIGIBLE
 
 GIVEN = 4        # columns of the table after those of the unknowns
@@ -28,31 +30,22 @@ def write_limits(table, first, last, period, bounds, A, sides):
     """
     n, row = A.shape[1], 0
     least = NEGLIGIBLE * _largest(table[first:last, :n])
-    for c in range(n):
-        bounds[0, c], bounds[1, c] = -np.inf, np.inf
+    fill(bounds[0], -np.inf)
+    fill(bounds[1], np.inf)
     for i in range(first, last):
-        h = table[i, n] / period
-        if np.isnan(h) or h == -np.inf:
-            return ODD
+        g, h = table[i, :n], table[i, n] / period
         if h == np.inf:
             continue
-        unknown, count = -1, 0
+        if not (h > -np.inf and all_finite(g)):
+            return ODD
         for c in range(n):
-            if not np.isfinite(table[i, c]):
-                return ODD
-            if abs(table[i, c]) <= least:
-                table[i, c] = 0.0
-            else:
-                unknown, count = c, count + 1
-        if count != 1:
-            for c in range(n):
-                A[row, c] = table[i, c]
+            g[c] = 0.0 if abs(g[c]) <= least else g[c]
+        if only_entry(g) >= 0:
+            narrow(bounds[0], bounds[1], g, -np.inf, h)
+        else:
+            assign(A[row], g)
             sides[0, row], sides[1, row] = -np.inf, h
             row += 1
-        elif table[i, unknown] > 0.0:
-            bounds[1, unknown] = min(bounds[1, unknown], h / table[i, unknown])
-        else:
-            bounds[0, unknown] = max(bounds[0, unknown], h / table[i, unknown])
     return _write_bounds(bounds, A, sides, row)
 
 
@@ -72,8 +65,7 @@ def _write_bounds(bounds, A, sides, row):
         if bounds[0, c] > bounds[1, c]:
             return CONTRADICT - c
         if bounds[0, c] > -np.inf or bounds[1, c] < np.inf:
-            for j in range(A.shape[1]):
-                A[row, j] = 0.0
+            fill(A[row], 0.0)
             A[row, c] = 1.0
             sides[0, row], sides[1, row] = bounds[0, c], bounds[1, c]
             row += 1
@@ -93,12 +85,10 @@ def write_tasks(table, first, last, period, A, sides, row):
         if cost == 0.0:
             continue
         value = -cost * (table[i, n + 2] / period) * table[i, n]
-        if not np.isfinite(value):
-            return ODD
         for c in range(n):
             A[row, c] = cost * table[i, c]
-            if not np.isfinite(A[row, c]):
-                return ODD
+        if not (np.isfinite(value) and all_finite(A[row])):
+            return ODD
         if _largest(table[i:i + 1, :n]) <= least:
             fill(A[row], 0.0)
         sides[0, row] = sides[1, row] = value
@@ -111,9 +101,7 @@ def largest_violation(A, lower, upper, x, first, last):
     """The largest distance of a row from its bounds at x, over the rows from first to last."""
     largest = 0.0
     for i in range(first, last):
-        value = 0.0
-        for c in range(A.shape[1]):
-            value += A[i, c] * x[c]
+        value = inner_product(A[i], x)
         largest = max(largest, value - upper[i], lower[i] - value)
     return largest
 
@@ -134,8 +122,8 @@ def damp(table, first, last, pull, A, sides, row, end):
     if total <= NO_DAMPING:
         return 0.0
     for c in range(n):
-        for j in range(n):
-            A[end + c, j] = np.sqrt(total) if j == c else 0.0
+        fill(A[end + c], 0.0)
+        A[end + c, c] = np.sqrt(total)
         sides[0, end + c] = np.sqrt(total) * weight / total * centre[c]
     _merge_rows(A, sides, row, end + n)
     return total
@@ -152,8 +140,7 @@ def _merge_rows(A, sides, first, last):
     m, n = last - first, A.shape[1]
     M, total = np.zeros((m, n + 1)), np.empty(n + 1)
     for i in range(m):
-        for c in range(n):
-            M[i, c] = A[first + i, c]
+        assign(M[i, :n], A[first + i])
         M[i, n] = sides[0, first + i]
     for k in range(n):
         reflect_columns(M, k, m, k, k + 1, total)
@@ -164,6 +151,5 @@ def _merge_rows(A, sides, first, last):
         for i in range(n):
             M[i, c] = (M[i, c] if i <= c else 0.0) - 2.0 * mean
     for i in range(n):
-        for c in range(n):
-            A[first + i, c] = M[i, c]
+        assign(A[first + i], M[i, :n])
         sides[0, first + i] = sides[1, first + i] = M[i, n]

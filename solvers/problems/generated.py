@@ -23,16 +23,7 @@ import numpy as np
 from numpy.linalg import norm
 
 from hierarchy.archives import read_arrays
-from hierarchy.errors import (
-    SEEDS,
-    HierarchyError,
-    expect,
-    file_path,
-    finite_numbers,
-    number,
-    refuse,
-    whole,
-)
+from hierarchy.errors import SEEDS, HierarchyError, expect, file_path, finite_numbers, number, whole
 from hierarchy.problem import Array, Hierarchy
 from solvers.problems.kinds import Random, happens
 
@@ -80,7 +71,8 @@ class Recipe:
             what, value = f"recipe: {field.name}", getattr(self, field.name)
             if field.name in least:
                 low, high = finite_numbers(what, value, 2)
-                refuse(not least[field.name] <= low <= high, f"{what} = {value!r} is out of range")
+                if not least[field.name] <= low <= high:
+                    raise HierarchyError(f"{what} = {value!r} is out of range")
             elif field.name == "equalities_only":
                 expect(what, value, bool, "give True or False")
             elif field.name == "spread":

@@ -31,7 +31,8 @@ def structured(seed: int, kinds: Sequence[str] = (), equalities_only: bool = Fal
     chosen = str(rng.choice(list(kinds or _MAKERS)))
     levels = _MAKERS[chosen](rng)
     if equalities_only:
-        levels = [_as_equalities(level) for level in levels]
+        levels = [equal(A, np.where(np.isfinite(low), low, np.where(np.isfinite(up), up, 0.0)))
+                  for A, low, up in levels]
     n = levels[0][0].shape[1]
     reference = rng.integers(-1, 2, n).astype(float) if happens(rng, 0.3) else None
     return Hierarchy.from_levels(levels, reference)
@@ -310,11 +311,6 @@ def stacked(*levels: Level) -> Level:
     """Return the rows of levels as one level."""
     A, lower, upper = zip(*levels, strict=True)
     return np.vstack(A), np.concatenate(lower), np.concatenate(upper)
-
-
-def _as_equalities(level: Level) -> Level:
-    A, lower, upper = level
-    return equal(A, np.where(np.isfinite(lower), lower, np.where(np.isfinite(upper), upper, 0.0)))
 
 
 def happens(rng: Random, chance: float) -> bool:

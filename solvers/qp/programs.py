@@ -109,10 +109,14 @@ def _sparse(M: Array) -> csc_matrix:
     return csc_matrix((M[rows, columns], rows.astype(np.intc), starts), M.shape)
 
 
-def null_space_program(goal: Rows, limits: Rows, kept: Rows, lam: float, start: Array | None
-                       ) -> Program:
-    """Return the program with unknowns z and w (k,), the signed violation of each limit."""
+def null_space_program(goal: Rows, limits: Rows, kept: Rows, lam: float, start: Array | None,
+                       held: Rows | None = None) -> Program:
+    """Return the program with unknowns z and w (k,), the signed violation of each limit.
+
+    held : equalities, whose `lower` counts; None for none.
+    """
     p, k = goal.A.shape[1], limits.lower.size
+    F, f, _ = Rows.none(p) if held is None else held
     P, A = np.eye(p + k), np.zeros((k + kept.lower.size, p + k))
     P[:p, :p] = goal.A.T @ goal.A + lam**2 * P[:p, :p]
     A[:k, :p], A[:k, p:], A[k:, :p] = limits.A, -P[p:, p:], kept.A
@@ -120,33 +124,23 @@ def null_space_program(goal: Rows, limits: Rows, kept: Rows, lam: float, start: 
     return Program(P, np.concatenate([-goal.A.T @ goal.lower, np.zeros(k)]), A,
                    np.concatenate([limits.lower, kept.lower]),
                    np.concatenate([limits.upper, kept.upper]),
-                   np.empty((0, p + k)), np.empty(0), begin)
+                   np.hstack([F, np.zeros((len(F), k))]), f, begin)
 
 
-def slack_program(goal: Rows, limits: Rows, kept: Rows, F: Array, lam: float, *,
-                  last: bool = False, start: Array | None = None, f: Array | None = None
-                  ) -> Program:
-    """Return the program with unknowns d (n,), the step, and w (k,), the violation of each row.
+def slack_program(goal: Rows, limits: Rows, kept: Rows, held: Rows, lam: float,
+                  start: Array | None = None) -> Program:
+    """Return the program with unknowns d (n,), the step, and w, the violation of each row.
 
-    f : F d = f; None for zero.
-    last : whether `goal` is d itself, which needs no w.
+    It is that of the goal lam d, w_g = 0, w_g being what each row of the given one misses.
     """
-    n, m, k = goal.A.shape[1], 0 if last else goal.lower.size, limits.lower.size
-    P = np.eye(n + m + k)
-    P[:n, :n] *= 1.0 if last else lam**2
-    q = np.zeros(n + m + k)
-    q[:n] = -goal.lower if last else 0.0
-    kept_rows = np.hstack([kept.A, np.zeros((kept.lower.size, m + k))])
-    limit_rows = np.hstack([limits.A, np.zeros((k, m)), -np.eye(k)])
-    goal_rows = np.hstack([goal.A[:m], -np.eye(m), np.zeros((m, k))])
-    settled = np.hstack([F, np.zeros((len(F), m + k))])
-    begin = None if start is None else np.concatenate(
-        [start, (goal.A @ start - goal.lower)[:m], limits.excess(start)])
-    return Program(P, q, np.vstack([limit_rows, kept_rows]),
-                   np.concatenate([limits.lower, kept.lower]),
-                   np.concatenate([limits.upper, kept.upper]),
-                   np.vstack([goal_rows, settled]),
-                   np.concatenate([goal.lower[:m], np.zeros(len(F)) if f is None else f]), begin)
+    (m, n), none = goal.A.shape, np.zeros(len(goal.A))
+    limits, kept, held = (Rows(np.hstack([rows.A, np.zeros((len(rows.A), m))]), *rows[1:])
+                          for rows in (limits, kept, held))
+    missed = Rows(np.hstack([goal.A, -np.eye(m)]), goal.lower, goal.upper)
+    if start is not None:
+        start = np.concatenate([start, goal.A @ start - goal.lower])
+    weights = Rows(np.diag([*[lam] * n, *none + 1.0]), *[np.zeros(n + m)] * 2)
+    return null_space_program(weights, limits, kept, 0.0, start, missed.and_(held))
 
 
 def level_problem(h: Hierarchy, level: int, above: ArrayLike | None = None, *,
@@ -169,21 +163,6 @@ def level_problem(h: Hierarchy, level: int, above: ArrayLike | None = None, *,
     expect("level_problem: h", h, Hierarchy, "make one with Hierarchy.from_levels")
     h.refuse_extras("the hierarchy", "level_problem")
     refuse(not sound_rows(*h.rows[:3]), "level_problem: rows are not finite or sides cross")
-    x = _checked(h, level, above)
-    m = int(h.offsets[level])
-    kept, F = _above(Rows(h.A[:m], h.lower[:m], h.upper[:m]), x)
-    last = level == len(h.sizes)
-    goal, limits = Rows(np.eye(h.n), h.reference, h.reference), Rows.none(h.n)
-    if not last:
-        own = slice(m, int(h.offsets[level + 1]))
-        rows = Rows(h.A[own], h.lower[own], h.upper[own])
-        equal = rows.lower == rows.upper
-        goal, limits = rows.where(equal), rows.where(~equal)
-    return slack_program(goal, limits, kept, F, 0.0, last=last, f=F @ x).problem(sparse)
-
-
-def _checked(h: Hierarchy, level: int, above: ArrayLike | None) -> Array:
-    """Return `above` as an array (n,), or raise a HierarchyError."""
     if whole("level_problem: level", level) > len(h.sizes):
         raise HierarchyError(f"level {level}: the hierarchy has levels 0 to {len(h.sizes) - 1}, "
                              f"and {len(h.sizes)} for its reference")
@@ -192,14 +171,21 @@ def _checked(h: Hierarchy, level: int, above: ArrayLike | None) -> Array:
     if x.shape != (h.n,) or not np.isfinite(x).all():
         raise HierarchyError(f"level {level}: above must be the x ({h.n},) of the levels above, "
                              f"finite, got {above!r}")
-    return x
+    m = int(h.offsets[level])
+    kept, held = _above(Rows(h.A[:m], h.lower[:m], h.upper[:m]), x)
+    if level == len(h.sizes):
+        goal = Rows(np.eye(h.n), h.reference, h.reference)
+        return null_space_program(goal, Rows.none(h.n), kept, 0.0, None, held).problem(sparse)
+    rows = Rows(*list(h.levels())[level])
+    equal = rows.lower == rows.upper
+    return slack_program(rows.where(equal), rows.where(~equal), kept, held, 0.0).problem(sparse)
 
 
-def _above(rows: Rows, x: Array) -> tuple[Rows, Array]:
-    """Return the rows above that remain inequalities, and a basis F of those that are fixed."""
+def _above(rows: Rows, x: Array) -> tuple[Rows, Rows]:
+    """Return the rows above that remain inequalities, and a basis of those fixed, at x."""
     value = rows.A @ x
     fixed = (rows.lower == rows.upper) | (abs(rows.excess(x)) > _SETTLED * (1.0 + abs(value)))
     F = split(rows.A[fixed], np.linalg.norm(rows.A[fixed], axis=1), _RANK)[0].T
     kept = rows.where(~fixed)
     return Rows(kept.A, np.minimum(kept.lower, value[~fixed]),
-                np.maximum(kept.upper, value[~fixed])), F
+                np.maximum(kept.upper, value[~fixed])), Rows(F, F @ x, F @ x)

@@ -40,16 +40,12 @@ class Rows(NamedTuple):
 
     def from_(self, x: Array) -> Rows:
         """Return the same rows for the unknown d of x + d."""
-        if not self.lower.size:
-            return self
         value = self.A @ x
         return Rows(self.A, self.lower - value, self.upper - value)
 
     def seen(self, N: Array, rank_tolerance: float) -> Rows:
         """Return the same rows for the unknown z of N z, with zeros for rows dependent on N."""
         A, sizes = self.A @ N, lengths(self.A)
-        if not sizes.size:
-            return Rows(A, self.lower, self.upper)
         A[lengths(A) <= rank_tolerance * sizes] = 0.0
         A[abs(A) <= ROUNDING * sizes[:, None]] = 0.0
         return Rows(A, self.lower, self.upper)
@@ -64,7 +60,7 @@ class Rows(NamedTuple):
         """Return the rows chosen by a mask."""
         if chosen.all():
             return self
-        return Rows(self.A[chosen], self.lower[chosen], self.upper[chosen])
+        return Rows(*(part[chosen] for part in self))
 
     def sided(self) -> Rows:
         """Return the rows with a finite side."""
@@ -72,20 +68,16 @@ class Rows(NamedTuple):
 
     def and_(self, other: Rows) -> Rows:
         """Return these rows with the other rows below them."""
-        return Rows(np.vstack([self.A, other.A]), np.concatenate([self.lower, other.lower]),
-                    np.concatenate([self.upper, other.upper]))
+        return Rows(*map(np.concatenate, zip(self, other, strict=True)))
 
     def sides(self, z: Array, near: float) -> Array:
         """Return +1 where A z is near or above `upper`, -1 near or below `lower`, else 0.
 
         near : distance that counts as near, relative to 1 + |side|.
         """
-        value = self.A @ z
-        up, low = np.isfinite(self.upper), np.isfinite(self.lower)
-        side = np.zeros(len(value))
-        side[low] -= value[low] <= self.lower[low] + near * (1.0 + abs(self.lower[low]))
-        side[up] += value[up] >= self.upper[up] - near * (1.0 + abs(self.upper[up]))
-        return side
+        value, (low, up) = self.A @ z, near * (1.0 + np.abs([self.lower, self.upper]))
+        with np.errstate(invalid="ignore"):  # inf - inf is NaN, which nothing is near
+            return np.asarray(1.0 * (value >= self.upper - up) - (value <= self.lower + low))
 
     def at(self, side: Array) -> Array:
         """Return `upper` where side > 0, `lower` elsewhere."""

@@ -1,7 +1,7 @@
 """All levels merged into one, for comparison."""
 
 from dataclasses import dataclass
-from typing import ClassVar, final
+from typing import final
 
 from hierarchy.problem import Array, Hierarchy
 from solvers.kernels.staircase import solve_as_one
@@ -19,9 +19,9 @@ class Augmented(Resolver):
     stack as one level.
     """
 
-    name: ClassVar[str] = "augmented"
-    damps: ClassVar[str] = "the whole stack"
-    strict: ClassVar[bool] = False  # lower levels can disturb higher ones
+    name = "augmented"
+    damps = "the whole stack"
+    strict = False  # lower levels can disturb higher ones
 
     def solve(self, h: Hierarchy, memory: Array | None = None) -> Resolution:
         """Resolve h; a direct method that ignores `memory`."""

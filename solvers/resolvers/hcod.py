@@ -3,28 +3,16 @@
 from collections.abc import Callable
 from dataclasses import dataclass
 from math import isnan
-from typing import Any, ClassVar, final
+from typing import Any, final
 
 import numpy as np
 from numpy.typing import NDArray
 
 from hierarchy.problem import Array, Hierarchy
-from solvers.kernels.active_set.exact import (
-    DAMPING,
-    solve_damped,
-    solve_equalities,
-    solve_hierarchy,
-)
+from solvers.kernels.active_set.exact import solve_damped, solve_equalities, solve_hierarchy
 from solvers.kernels.give import solve_giving
-from solvers.resolver import Handles, Resolution, Resolver, number, register, whole_number
-from solvers.status import (
-    ITERATION_LIMIT,
-    NUMERICAL_FAILURE,
-    SOLVED,
-    TOO_SMALL,
-    UNPROVED,
-    Status,
-)
+from solvers.resolver import Resolution, Resolver, number, register, whole_number
+from solvers.status import ITERATION_LIMIT, NUMERICAL_FAILURE, SOLVED, TOO_SMALL, UNPROVED, Status
 from solvers.workspace import WORKSPACE, entry, run
 
 
@@ -83,9 +71,7 @@ class ActiveSetResolution(Resolution):
         return max(0, int(self.record[-1])) if limited else None
 
     def _part(self, which: int) -> Array:
-        m = (len(self.record) - 3) // 3
-        part: Array = self.record[which * m:(which + 1) * m]
-        return part
+        return np.asarray(self.record[:-3].reshape(3, -1)[which])
 
 
 @final
@@ -104,16 +90,16 @@ class Hcod(Resolver):
     max_iterations : working sets tried before Status.ITERATION_LIMIT, never exceeded.
     """
 
-    name: ClassVar[str] = "hcod"
-    handles: ClassVar[Handles] = "inequalities"
-    damps_with_bounds: ClassVar[str] = "each level, without what bounds hold"
+    name = "hcod"
+    handles = "inequalities"
+    damps_with_bounds = "each level, without what bounds hold"
     tolerance: float = number(1e-10, high=1e-3, open_below=True)
     max_iterations: int = whole_number(1000, 1)
 
     def solve(self, h: Hierarchy, memory: Array | None = None) -> ActiveSetResolution:
         """Resolve h, starting from the working set of an earlier resolution if given."""
         x, record = h.start(), warm_record(memory, 3 * h.m + 3)
-        code = solve_exactly(h, x, record, self._settings)
+        code = solve_exactly(h, x, record, self)
         return ActiveSetResolution(x, _SOLVED if code == SOLVED else Status(code), record)
 
     def _solve_giving(self, h: Hierarchy, memory: Array | None) -> Resolution:
@@ -145,13 +131,13 @@ def warm_record(memory: Array | None, size: int) -> Array:
     return np.zeros(size) if memory is None or memory.size != size else memory.flatten()
 
 
-def solve_exactly(h: Hierarchy, x: Array, record: Array, settings: Array) -> int:
+def solve_exactly(h: Hierarchy, x: Array, record: Array, resolver: Hcod) -> int:
     """Solve with the exact kernel, in a work space that is large enough; return its code.
 
     x (n,) is the reference on entry and the answer on return.
     """
     A, lower, upper, sizes = h.rows  # `*h.rows` takes 60 ns more
-    damped = settings.item(DAMPING) > 0.0
+    settings, damped = resolver._settings, resolver.damping > 0.0
     solve = _kernels.get(damped) or _kernels.setdefault(damped, entry(solve_equalities))
     while (code := solve(A, lower, upper, sizes, x, record, settings, WORKSPACE.array)) in _AGAIN:
         if code == TOO_SMALL:

@@ -1,7 +1,8 @@
 """A cascade of quadratic programs, one per level, through any backend of qpsolvers."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import ClassVar, final
+from typing import final
 
 import numpy as np
 from numpy.linalg import norm
@@ -14,7 +15,7 @@ from solvers.kernels.tolerances import NEGLIGIBLE
 from solvers.qp.backends import backend_of
 from solvers.qp.programs import null_space_program, slack_program
 from solvers.qp.refinement import EXACT, Rows, below_largest, least, lengths, refined, split
-from solvers.resolver import Handles, Resolution, Resolver, number, one_of, register
+from solvers.resolver import Resolution, Resolver, number, one_of, register
 from solvers.status import Status
 
 Mask = NDArray[np.bool_]
@@ -45,9 +46,9 @@ class Hqp(Resolver):
     form: str = one_of("null-space", "slack")
     slack: float = number(1e-7, high=1.0)
 
-    name: ClassVar[str] = "hqp"
-    handles: ClassVar[Handles] = "inequalities"
-    damps_with_bounds: ClassVar[str] = "each level as if no inequality were active"
+    name = "hqp"
+    handles = "inequalities"
+    damps_with_bounds = "each level as if no inequality were active"
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -205,9 +206,8 @@ class _Cascade:
         """
         s, kept, vouched = self.settings, self._movable(), False
         level = goal, limits, kept
-        seen = goal_seen, limits_seen, kept_seen = (
-            goal.seen(self.N, s.rank_tolerance), limits.seen(self.N, s.rank_tolerance),
-            kept.seen(self.N, s.rank_tolerance))
+        seen = goal_seen, limits_seen, kept_seen = [
+            rows.seen(self.N, s.rank_tolerance) for rows in level]
         E, e = self._target(goal, goal_seen, own, lam, last)
         for wider in _WIDER:
             z, found = self._ask(seen if s.form == "null-space" else level, wider, lam, last)
@@ -244,7 +244,7 @@ class _Cascade:
             return np.asarray(own @ y)
         return least(E, e, lengths(E), self.settings.rank_tolerance)[0]
 
-    def _ask(self, level: tuple[Rows, Rows, Rows], wider: float, lam: float, last: bool
+    def _ask(self, level: Sequence[Rows], wider: float, lam: float, last: bool
              ) -> tuple[Array, bool]:
         """Return the z of the backend, and whether the backend vouches for it.
 
@@ -256,7 +256,9 @@ class _Cascade:
         start = None if self.starts is None else self.starts[len(self.steps)]
         self.programs += 1
         if self.settings.form == "slack":
-            program = slack_program(goal, limits, kept, self.F, lam, last=last, start=start)
+            held = Rows(self.F, *[np.zeros(len(self.F))] * 2)
+            program = (null_space_program(goal, limits, kept, 0.0, start, held) if last else
+                       slack_program(goal, limits, kept, held, lam, start))
             d, found = program.solve(self.backend, wider)
             return self.N.T @ d[:self.h.n], found
         if start is not None:

@@ -4,7 +4,7 @@ from abc import abstractmethod
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Any, ClassVar, Self, cast, final
+from typing import Any, Self, cast, final
 
 import numpy as np
 
@@ -21,7 +21,7 @@ from solvers.kernels.merged import (
     record_size,
     write_levels,
 )
-from solvers.resolver import Handles, Resolution, Resolver, number, register, whole_number
+from solvers.resolver import Resolution, Resolver, number, register, whole_number
 from solvers.resolvers.hcod import Hcod, warm_record
 from solvers.status import SOLVED, Status
 from solvers.workspace import entry, run
@@ -52,10 +52,10 @@ class OneLevel(Resolver):
     tolerance, max_iterations : as in `hcod`, which solves.
     """
 
-    handles: ClassVar[Handles] = "inequalities"
-    strict: ClassVar[bool] = False
-    damps: ClassVar[str] = "the weighted level as a whole, about the reference"
-    damps_with_bounds: ClassVar[str] = damps
+    handles = "inequalities"
+    strict = False
+    damps = "the weighted level as a whole, about the reference"
+    damps_with_bounds = damps
     tolerance: float = number(Hcod.tolerance, high=1e-3, open_below=True)
     max_iterations: int = whole_number(Hcod.max_iterations, 1)
 
@@ -145,7 +145,7 @@ class Merged(OneLevel):
     regularisation : weight of |x - reference|, for unknowns that no merged equality names alone.
     """
 
-    name: ClassVar[str] = "merged"
+    name = "merged"
     ratio: float = number(4.0, 1.0, 1e6)
     scales: Mapping[str, float] | tuple[tuple[str, float], ...] = ()
     cap: float = number(1.0)
@@ -155,7 +155,13 @@ class Merged(OneLevel):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        set_frozen(self, scales=_checked(self.scales))
+        try:
+            pairs = dict(self.scales)
+        except (TypeError, ValueError) as error:
+            raise HierarchyError(f"merged: scales = {self.scales!r}, expected numbers > 0 by a "
+                                 "level's name") from error
+        set_frozen(self, scales=tuple((name, positive(f"merged: scales: {name!r}", scale))
+                                      for name, scale in pairs.items()))  # which can be hashed
 
     @property
     def label(self) -> str:
@@ -176,15 +182,3 @@ def refuse_safety_alone(resolver: OneLevel, h: Hierarchy) -> None:
     """Raise a HierarchyError: every level of h is strict."""
     raise HierarchyError(f"{resolver.name}: all levels stay strict ({', '.join(h.names)}) and none "
                          "is left to merge; set strict_levels, or use hcod")
-
-
-def _checked(scales: Mapping[str, float] | tuple[tuple[str, float], ...]
-             ) -> tuple[tuple[str, float], ...]:
-    """Return the scales as pairs, which a record can hold."""
-    try:
-        pairs = dict(scales)
-    except (TypeError, ValueError) as error:
-        raise HierarchyError(f"merged: scales = {scales!r}, expected numbers > 0 by a level's name"
-                             ) from error
-    return tuple((name, positive(f"merged: scales: {name!r}", scale))
-                 for name, scale in pairs.items())

@@ -1,8 +1,7 @@
 """The standard recursion with null-space projections."""
 
-from collections.abc import Callable
 from dataclasses import dataclass
-from typing import ClassVar, final
+from typing import final
 
 from hierarchy.errors import HierarchyError
 from hierarchy.records import set_frozen
@@ -30,8 +29,8 @@ class Recursive(Direct):
     largest : gamma_max of "selective", in the unit of x; None is no damping. It ignores `damping`.
     """
 
-    name: ClassVar[str] = "recursive"
-    kernel: ClassVar[Callable[..., int]] = staticmethod(recursion)
+    name = "recursive"
+    kernel = staticmethod(recursion)
     method: str = one_of("level", *_DAMPS)  # in the order of `solvers.kernels.recursion`
     isotropic: float = number(0.0)
     largest: float | None = number(None, open_below=True)

@@ -1,8 +1,7 @@
 """Reverse priority: from the lowest level to the highest."""
 
-from collections.abc import Callable
 from dataclasses import dataclass
-from typing import ClassVar, final
+from typing import final
 
 from hierarchy.records import set_frozen
 from solvers.kernels.reverse import reverse
@@ -28,9 +27,9 @@ class Reverse(Direct):
     robots", IROS 2014.
     """
 
-    name: ClassVar[str] = "reverse"
-    damps: ClassVar[str] = "each correction"
-    kernel: ClassVar[Callable[..., int]] = staticmethod(reverse)
+    name = "reverse"
+    damps = "each correction"
+    kernel = staticmethod(reverse)
     form: str = one_of("published", "in-order")
 
     def __post_init__(self) -> None:

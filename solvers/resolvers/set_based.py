@@ -3,7 +3,7 @@
 from collections.abc import Iterator
 from dataclasses import dataclass
 from itertools import chain, combinations, islice
-from typing import ClassVar, final
+from typing import final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from hierarchy.errors import HierarchyError
 from hierarchy.gate import sound_rows
 from hierarchy.problem import Array, Hierarchy
-from solvers.resolver import Around, Handles, Resolution, number, place_of, whole_number
+from solvers.resolver import Around, Resolution, number, place_of, whole_number
 from solvers.status import EQUAL, FREE, LOWER, UPPER, Status
 
 
@@ -37,8 +37,8 @@ class SetBased(Around):
 
     tolerance: float = number(1e-10, high=1e-3)
     most: int = whole_number(256, 1)
-    name: ClassVar[str] = "set-based"
-    handles: ClassVar[Handles] = "inequalities"
+    name = "set-based"
+    handles = "inequalities"
 
     def solve(self, h: Hierarchy, memory: Array | None = None) -> Resolution:
         """Resolve h; every mode is resolved afresh, `memory` is not used.

@@ -23,14 +23,14 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
-from typing import ClassVar, NamedTuple, final
+from typing import NamedTuple, final
 
 import numpy as np
 
 from hierarchy.problem import Array, Hierarchy
 from solvers.kernels.met import ABOVE, plainly_met
 from solvers.qp.refinement import below_largest
-from solvers.resolver import Around, Handles, Resolution, Resolver, number
+from solvers.resolver import Around, Resolution, Resolver, number
 from solvers.resolvers.hcod import ActiveSetResolution
 from solvers.resolvers.merged import OneLevel
 from solvers.status import Status
@@ -70,8 +70,8 @@ class Settled(Around):
     curved: frozenset[str] = frozenset()
     bends: Mapping[str, float] = field(default_factory=dict)
     geared: bool = False
-    name: ClassVar[str] = "settled"
-    handles: ClassVar[Handles] = "inequalities"
+    name = "settled"
+    handles = "inequalities"
 
     def solve(self, h: Hierarchy, memory: Array | None = None) -> Resolution:
         """Resolve h; where a curved level is not plainly met, some problems of the levels to it."""

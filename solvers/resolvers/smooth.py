@@ -17,7 +17,7 @@ The last level is the identity. docs/theory/smooth.md has V and P.
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import ClassVar, final
+from typing import final
 
 import numpy as np
 
@@ -25,16 +25,8 @@ from hierarchy.errors import HierarchyError
 from hierarchy.gate import shaped
 from hierarchy.problem import Array, Hierarchy
 from solvers.qp.refinement import below_largest
-from solvers.resolver import (
-    Around,
-    Handles,
-    Resolution,
-    Resolver,
-    number,
-    place_of,
-    refuse_inequality,
-    register,
-)
+from solvers.resolution import Resolution
+from solvers.resolver import Around, Resolver, number, place_of, refuse_inequality, register
 from solvers.status import Status
 
 
@@ -59,17 +51,13 @@ class Smooth(Resolver):
     Systems (2016).
     """
 
-    name: ClassVar[str] = "smooth"
-    handles: ClassVar[Handles] = "activations"
-    strict: ClassVar[bool] = False  # rows that act in part share directions with lower levels
-    accuracy: ClassVar[float] = 1e-6  # errors grow with the square of the condition number
+    name = "smooth"
+    handles = "activations"
+    strict = False  # rows that act in part share directions with lower levels
+    accuracy = 1e-6  # errors grow with the square of the condition number
     damping: float = 1e-4
     threshold: float = 1e-2
     eta: float = number(10.0, open_below=True)
-
-    def can_resolve(self, required: Handles) -> bool:
-        """Equalities act fully; for other rows it needs activations."""
-        return super().can_resolve(required) and required in ("equalities", "activations")
 
     def solve(self, h: Hierarchy, memory: Array | None = None) -> Resolution:
         """Resolve h with all rows fully active; HierarchyError for an inequality."""
@@ -133,8 +121,8 @@ class Activated(Around):
 
     inner: Smooth
     activation: Callable[[], Array]
-    name: ClassVar[str] = "smooth"
-    handles: ClassVar[Handles] = "activations"
+    name = "smooth"
+    handles = "activations"
 
     def solve(self, h: Hierarchy, memory: Array | None = None) -> Resolution:
         """Resolve h at the present activations."""

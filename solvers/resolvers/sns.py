@@ -1,7 +1,7 @@
 """Saturation in the null space: hard bounds on single unknowns, tasks scaled to fit."""
 
 from dataclasses import dataclass
-from typing import ClassVar, final
+from typing import final
 
 import numpy as np
 
@@ -9,7 +9,7 @@ from hierarchy.errors import HierarchyError
 from hierarchy.problem import Array, Hierarchy
 from solvers.kernels.sns import sns
 from solvers.resolution import SaturatedResolution
-from solvers.resolver import Handles, Resolution, Resolver, one_of, place_of, register
+from solvers.resolver import Resolution, Resolver, one_of, place_of, register
 from solvers.status import CONTRADICTION, TOO_SMALL, Status
 from solvers.workspace import WORKSPACE
 
@@ -34,9 +34,9 @@ class Sns(Resolver):
     each other.
     """
 
-    name: ClassVar[str] = "sns"
-    handles: ClassVar[Handles] = "bounds"
-    damps_with_bounds: ClassVar[str] = "each task on the joints that are not saturated"
+    name = "sns"
+    handles = "bounds"
+    damps_with_bounds = "each task on the joints that are not saturated"
     form: str = one_of("basic", "optimal")
     scales: str = one_of("target", "miss")
 

@@ -3,7 +3,7 @@
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any, ClassVar, final
+from typing import Any, final
 
 import numpy as np
 
@@ -13,17 +13,8 @@ from hierarchy.records import set_frozen
 from solvers.kernels.bounds import solve_within_bounds
 from solvers.kernels.published import matrix_as_published, solve_as_published
 from solvers.kernels.staircase import solve_by_staircase
-from solvers.resolution import SaturatedResolution
-from solvers.resolver import (
-    Handles,
-    Resolution,
-    Resolver,
-    make,
-    one_of,
-    refuse_inequality,
-    register,
-    register_variant,
-)
+from solvers.resolution import Resolution, SaturatedResolution
+from solvers.resolver import Resolver, make, one_of, refuse_inequality, register, register_variant
 from solvers.resolvers.hcod import Hcod, warm_record
 from solvers.status import SOLVED, Status
 from solvers.workspace import WORKSPACE, entry, run
@@ -51,9 +42,9 @@ class Tpm(Resolver):
     See docs/theory/tpm.md, and docs/theory/strict.md for damping.
     """
 
-    name: ClassVar[str] = "tpm"
-    handles: ClassVar[Handles] = "bounds"
-    damps_with_bounds: ClassVar[str] = Hcod.damps_with_bounds
+    name = "tpm"
+    handles = "bounds"
+    damps_with_bounds = Hcod.damps_with_bounds
     form: str = one_of(*FORMS)
 
     def __post_init__(self) -> None:

@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import ClassVar, final
+from typing import final
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -33,7 +33,7 @@ class Weighted(OneLevel):
         pink and mink call mu^2 damping, 1e-12 by default.
     """
 
-    name: ClassVar[str] = "weighted"
+    name = "weighted"
     ratio: float = number(100.0, 1.0)
     weights: Sequence[float] | None = None
     strict_levels: int | None = whole_number(None, -1)
@@ -41,8 +41,11 @@ class Weighted(OneLevel):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        if self.weights is not None:
-            set_frozen(self, weights=_checked(self.weights))
+        if (weights := self.weights) is not None:
+            refuse(not isinstance(weights, list | tuple | np.ndarray)
+                   or not all(0.0 < as_float(w) < np.inf for w in weights),
+                   f"weighted: weights = {weights!r}: expected numbers > 0")
+            set_frozen(self, weights=tuple(map(float, weights)))
 
     @property
     def label(self) -> str:
@@ -110,10 +113,3 @@ def lexicographic_weights(violations: ArrayLike, tolerance: float, regularised: 
         weights.append(max(1.0, float(below / tolerance)))
         below = np.hypot(below, weights[-1] * v)
     return tuple(reversed(weights))
-
-
-def _checked(weights: Sequence[float]) -> tuple[float, ...]:
-    plain = isinstance(weights, list | tuple | np.ndarray)
-    refuse(not plain or not all(0.0 < as_float(w) < np.inf for w in weights),
-           f"weighted: weights = {weights!r}: expected numbers > 0")
-    return tuple(map(float, weights))

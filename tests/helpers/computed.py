@@ -33,7 +33,7 @@ from scenarios.measure.verdict import Comparison, goal_table, lines, verdicts
 from solvers import Resolution, certify, explain, make, solve_ik
 from solvers.adapters.displacements import Packed, Pull
 from solvers.adapters.drop_in import answer
-from solvers.batch.stacked import Batch, solve
+from solvers.batch import Batch, solve
 from solvers.factorization import Factorization
 from solvers.problems import ANY, generate, structured
 from solvers.proof import prove

@@ -9,7 +9,7 @@ from refusals import refused
 
 from hierarchy import Hierarchy
 from solvers import Status, make
-from solvers.batch import Batch, solve, stacked
+from solvers.batch import Batch, solve
 
 SLOW = os.environ.get("NUMBA_DISABLE_JIT") == "1"
 FEW = 12 if SLOW else 50
@@ -18,7 +18,7 @@ COPIES = 1 if SLOW else 4  # of a family's 50 problems, each with targets of its
 
 @pytest.fixture(autouse=True)
 def threads_for_small_batches(monkeypatch):
-    monkeypatch.setattr(stacked, "ENOUGH", 1)
+    monkeypatch.setattr("solvers.batch.ENOUGH", 1)
 
 
 def problems_of(of, copies=COPIES):

@@ -159,9 +159,10 @@ def test_a_search_of_scipys_that_gives_up_finds_nothing(monkeypatch):
 @pytest.mark.parametrize("row", [0, 1, 2])
 def test_a_row_is_in_the_span_of_a_level_if_it_is_where_each_turns_by_the_angle(row):
     """Its own turn and that of the row which it follows, whatever that weighs."""
-    view = certificate._View.of(np.eye(4)[:3], np.array([1.0, 1e-2, 1e-5]), 1e-8)
+    sizes = np.array([1.0, 1e-2, 1e-5])
     for beside, outside in ((0.5e-8, False), (1.9e-8, False), (2.1e-8, True)):
-        effect, _ = view.weighted(np.eye(4)[row:row + 1] + beside * np.eye(4)[3:])
+        other = np.eye(4)[row:row + 1] + beside * np.eye(4)[3:]
+        effect, *_ = certificate._weighted(np.eye(4)[:3], sizes, other, 1e-8)
         assert np.any(effect[3]) == outside
         assert np.any(effect[:3])
 
