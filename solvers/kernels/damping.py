@@ -14,7 +14,7 @@ depends on which of them act, and what a level hands down is unique: x is contin
 except where those of a row meet, which makes an equality of it.
 """
 
-from typing import NamedTuple
+from collections import namedtuple
 
 from hierarchy.jit import add_multiple, inlined, inner_product, internal
 from solvers.kernels.linalg.block import level_damping
@@ -26,32 +26,19 @@ from solvers.kernels.linalg.rows import (
     reflect,
     reflect_back,
 )
-from solvers.kernels.linalg.space import Block, View, assign, integers, matrix, shared, vector
+from solvers.kernels.linalg.space import Block, assign, integers, matrix, shared, vector
 from solvers.kernels.staircase import carve_staircase, solve_by_staircase
 from solvers.kernels.tolerances import LEVEL_MET, SATURATES
 from solvers.status import NUMERICAL_FAILURE, UNPROVED
 
+Damped = namedtuple("Damped", "A lower upper sizes factor E b ends Q ranks free")
+"""The rows of one level to damp and of those above it, and of the equalities alone.
 
-class Damped(NamedTuple):
-    """The rows of one level to damp and of those above it, and of the equalities alone.
-
-    A (m + n, n), lower, upper (m + n,), sizes (L,): m rows of the hierarchy, their sides as far as
-    they are met, then n rows of damping. factor (L,): lambda. E (m, n), b (m,), ends (L,): the
-    equalities, their targets, their number per level. Q (m, n), ranks (L,): the columns of the
-    staircase that each level adds, in its rows of E. free (n,): the x that meets the equalities.
-    """
-
-    A: View
-    lower: View
-    upper: View
-    sizes: View
-    factor: View
-    E: View
-    b: View
-    ends: View
-    Q: View
-    ranks: View
-    free: View
+A (m + n, n), lower, upper (m + n,), sizes (L,): m rows of the hierarchy, their sides as far as
+they are met, then n rows of damping. factor (L,): lambda. E (m, n), b (m,), ends (L,): the
+equalities, their targets, their number per level. Q (m, n), ranks (L,): the columns of the
+staircase that each level adds, in its rows of E. free (n,): the x that meets the equalities.
+"""
 
 
 @inlined

@@ -4,7 +4,7 @@
 the exact kernel: rows are loaded once, and levels in which the same rows act are factored once.
 """
 
-from typing import NamedTuple
+from collections import namedtuple
 
 import numpy as np
 
@@ -27,7 +27,7 @@ from solvers.kernels.active_set.working_set import (
     start_from,
 )
 from solvers.kernels.linalg.rows import finish, length_of
-from solvers.kernels.linalg.space import View, assign, fill
+from solvers.kernels.linalg.space import assign, fill
 from solvers.status import INACCURATE, NUMERICAL_FAILURE, SOLVED, TOO_SMALL
 
 _ROUNDING = 1e-10  # of a violation, relative to |a| (1 + |x|)
@@ -58,15 +58,8 @@ def relax(A, lower, upper, give, x, first, last):
         lower[i] -= room
         upper[i] += room
 
-
-class Giving(NamedTuple):
-    """Rows (m, n) and sides (m,) as they are; what rows give (m,); room for K witnesses (K, n)."""
-
-    A: View
-    lower: View
-    upper: View
-    give: View
-    witnesses: View
+Giving = namedtuple("Giving", "A lower upper give witnesses")
+"""Rows (m, n) and sides (m,) as they are; what rows give (m,); room for K witnesses (K, n)."""
 
 
 @compiled

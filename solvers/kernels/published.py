@@ -5,34 +5,24 @@ above the last loses rank it gives the answer of the recursion only if no lower 
 columns that are wasted. For m > n, zero columns extend J to a square matrix.
 """
 
-from typing import NamedTuple
+from collections import namedtuple
 
 import numpy as np
 
 from hierarchy.jit import add_multiple, as_matrix, compiled, inlined, inner_product, internal
 from solvers.kernels.linalg.block import invert_triangle, orthogonalise_rows, smallest_square
 from solvers.kernels.linalg.rows import finish, load_rows, make_reflector, reflect, reflect_back
-from solvers.kernels.linalg.space import View, assign, fill, integers, matrix, shared, vector
+from solvers.kernels.linalg.space import assign, fill, integers, matrix, shared, vector
 from solvers.kernels.staircase import carve_staircase, climb
 from solvers.status import SOLVED, TOO_SMALL
 
+Matrices = namedtuple("Matrices", "R basis F T zero rest u of_x")
+"""The matrices from which F is computed, and F; N = max(m, n).
 
-class Matrices(NamedTuple):
-    """The matrices from which F is computed, and F; N = max(m, n).
-
-    R (m, N): R^T, the rows of J reflected. basis: the m reflectors of Q. F (m, m): F^T. T (m, m):
-    R^-1. zero (m,): squared norm at or below which a row is zero. rest: m + 3 m^2 numbers. u (m,),
-    of_x (1, N): intermediate results.
-    """
-
-    R: View
-    basis: View
-    F: View
-    T: View
-    zero: View
-    rest: View
-    u: View
-    of_x: View
+R (m, N): R^T, the rows of J reflected. basis: the m reflectors of Q. F (m, m): F^T. T (m, m):
+R^-1. zero (m,): squared norm at or below which a row is zero. rest: m + 3 m^2 numbers. u (m,),
+of_x (1, N): intermediate results.
+"""
 
 
 @inlined

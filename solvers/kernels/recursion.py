@@ -7,7 +7,7 @@ The dampings of Nakamura, Chiaverini, and Buss and Kim act in the singular value
 B = J_i P_{i-1} = sum_k s_k u_k v_k^T. Projectors stay undamped: no level disturbs those above it.
 """
 
-from typing import NamedTuple
+from collections import namedtuple
 
 import numpy as np
 
@@ -28,36 +28,21 @@ from solvers.kernels.linalg.rows import (
     swap,
     swap_rows,
 )
-from solvers.kernels.linalg.space import Block, View, assign, fill, matrix, shared, vector
+from solvers.kernels.linalg.space import Block, assign, fill, matrix, shared, vector
 from solvers.kernels.tolerances import NEGLIGIBLE, REMAINDER, SIGN_ROUNDING
 from solvers.status import INACCURATE, SOLVED, TOO_SMALL
 
 LEVEL, NAKAMURA, CHIAVERINI, SELECTIVE = 0.0, 1.0, 2.0, 3.0  # methods of `Recursive`, in order
 SHRUNK = 0.01  # squared norm of a remainder: smaller ones are projected a second time
 
+Inverse = namedtuple("Inverse", "method damping threshold isotropic largest")
+"""How to invert: the method, and settings as in `Recursive`, after the shared ones."""
 
-class Inverse(NamedTuple):
-    """How to invert: the method, and settings as in `Recursive`, after the shared ones."""
+Projected = namedtuple("Projected", "W C V P zero miss")
+"""Rows J_i P_{i-1} = C V, their residuals, and the projector.
 
-    method: View
-    damping: View
-    threshold: View
-    isotropic: View
-    largest: View
-
-
-class Projected(NamedTuple):
-    """Rows J_i P_{i-1} = C V, their residuals, and the projector.
-
-    W (m, n): the remainders of the rows. C (m, n), V (n, n), P (n, n). zero, miss (m,): see `Rows`.
-    """
-
-    W: View
-    C: View
-    V: View
-    P: View
-    zero: View
-    miss: View
+W (m, n): the remainders of the rows. C (m, n), V (n, n), P (n, n). zero, miss (m,): see `Rows`.
+"""
 
 
 @inlined
@@ -199,19 +184,12 @@ def _take_direction(rows, i, last, k, again):
     for j in range(v.size):
         add_multiple(rows.P[j], -v[j], v)  # (6)
 
+Singular = namedtuple("Singular", "S Y sizes step total")
+"""The decomposition of a level with p rows and rank r, and a step.
 
-class Singular(NamedTuple):
-    """The decomposition of a level with p rows and rank r, and a step.
-
-    S (r, p): row k is s_k u_k. Y (r, r): row k is v_k in coordinates of V. sizes (n,): norms of the
-    columns of B. step, total (n,): of one singular vector, and of the level.
-    """
-
-    S: View
-    Y: View
-    sizes: View
-    step: View
-    total: View
+S (r, p): row k is s_k u_k. Y (r, r): row k is v_k in coordinates of V. sizes (n,): norms of the
+columns of B. step, total (n,): of one singular vector, and of the level.
+"""
 
 
 @internal

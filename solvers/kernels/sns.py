@@ -7,7 +7,7 @@ joints, loses rank, the set with the largest s is the answer. Each task starts w
 No projector is formed here: saturated joints and the task have columns of Q, see `Space`.
 """
 
-from typing import NamedTuple
+from collections import namedtuple
 
 import numpy as np
 
@@ -28,9 +28,6 @@ from solvers.kernels.linalg.rows import (
 )
 from solvers.kernels.linalg.space import (
     Block,
-    Rows,
-    Settings,
-    View,
     assign,
     carve_rows,
     fill,
@@ -45,60 +42,29 @@ from solvers.status import CONTRADICTION, SOLVED, TOO_SMALL
 
 NO_JOINT = -1
 
+Task = namedtuple("Task", "J b zero")
+"""The rows of one task: J (p, n), b (p,); zero (p,): squared norms that count as zero."""
 
-class Task(NamedTuple):
-    """The rows of one task: J (p, n), b (p,); zero (p,): squared norms that count as zero."""
+Columns = namedtuple("Columns", "above joints task")
+"""Ends of the columns of Q: of the tasks above, the saturated joints, the task."""
 
-    J: View
-    b: View
-    zero: View
+Space = namedtuple(
+    "Space", "shared release of_miss low up reference unit basis E joint side y rows seen now zero"
+    " line y_a trial best of_block")
+"""Settings, the box, and intermediate results.
 
+release: whether saturated joints are released. of_miss: whether s scales the residual of a
+task instead of b. low, up, reference (n,). unit (1,): the largest |bound|, at most 1.
 
-class Columns(NamedTuple):
-    """Ends of the columns of Q: of the tasks above, the saturated joints, the task."""
+Q has columns for the tasks above, then one for each held joint in the order of holding; the
+rest is free. basis: its reflectors. E (n, n): unit vectors of the held joints, in coordinates
+of Q. joint (n,): their indices. side (n,): +1, -1 for a joint held at its upper, lower bound,
+else 0. y (n,): the step in each column of Q.
 
-    above: View
-    joints: View
-    task: View
-
-
-class Space(NamedTuple):
-    """Settings, the box, and intermediate results.
-
-    release: whether saturated joints are released. of_miss: whether s scales the residual of a
-    task instead of b. low, up, reference (n,). unit (1,): the largest |bound|, at most 1.
-
-    Q has columns for the tasks above, then one for each held joint in the order of holding; the
-    rest is free. basis: its reflectors. E (n, n): unit vectors of the held joints, in coordinates
-    of Q. joint (n,): their indices. side (n,): +1, -1 for a joint held at its upper, lower bound,
-    else 0. y (n,): the step in each column of Q.
-
-    rows: the factored rows of the task. seen (m, n): the same in Q, not factored. now (m,):
-    J_k x_{k-1}. zero (m,): of all tasks. line (2, n): a and c of x_k(s) = s a + c. y_a (n,): a in
-    Q. trial (1, n), best (n,): steps. of_block: work space of `solve_level`.
-    """
-
-    shared: Settings
-    release: View
-    of_miss: View
-    low: View
-    up: View
-    reference: View
-    unit: View
-    basis: View
-    E: View
-    joint: View
-    side: View
-    y: View
-    rows: Rows
-    seen: View
-    now: View
-    zero: View
-    line: View
-    y_a: View
-    trial: View
-    best: View
-    of_block: View
+rows: the factored rows of the task. seen (m, n): the same in Q, not factored. now (m,):
+J_k x_{k-1}. zero (m,): of all tasks. line (2, n): a and c of x_k(s) = s a + c. y_a (n,): a in
+Q. trial (1, n), best (n,): steps. of_block: work space of `solve_level`.
+"""
 
 
 @inlined

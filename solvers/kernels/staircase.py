@@ -6,7 +6,7 @@ levels are solved from the top by block forward substitution, least squares in e
 recursion (5), (13) in other coordinates. The columns of Q that no level takes carry (14).
 """
 
-from typing import NamedTuple
+from collections import namedtuple
 
 import numpy as np
 
@@ -23,8 +23,6 @@ from solvers.kernels.linalg.rows import (
 )
 from solvers.kernels.linalg.space import (
     Block,
-    Rows,
-    View,
     assign,
     carve_rows,
     fill,
@@ -35,19 +33,12 @@ from solvers.kernels.linalg.space import (
 from solvers.kernels.tolerances import FAR_LIGHTER, LIGHT_ROW, UNCLEAR_CUT, UNCLEAR_PIVOT
 from solvers.status import INACCURATE, NUMERICAL_FAILURE, SOLVED, TOO_SMALL
 
+Staircase = namedtuple("Staircase", "basis rows y of_x of_block")
+"""The rows in coordinates of Q.
 
-class Staircase(NamedTuple):
-    """The rows in coordinates of Q.
-
-    basis: the reflectors of Q. rows: the rows of J Q. y (n,): the answer in the columns of the
-    levels. of_x (1, n): x, for reflections. of_block: work space of `solve_level`.
-    """
-
-    basis: View
-    rows: Rows
-    y: View
-    of_x: View
-    of_block: View
+basis: the reflectors of Q. rows: the rows of J Q. y (n,): the answer in the columns of the
+levels. of_x (1, n): x, for reflections. of_block: work space of `solve_level`.
+"""
 
 
 @inlined

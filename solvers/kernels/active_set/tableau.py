@@ -12,7 +12,7 @@ Saunders 1974), never a new factorisation. The columns of a row depend on that r
 very different norm do not disturb each other.
 """
 
-from typing import NamedTuple
+from collections import namedtuple
 
 import numpy as np
 
@@ -33,7 +33,7 @@ from solvers.kernels.active_set.working_set import (
 )
 from solvers.kernels.linalg.least_squares import least_squares
 from solvers.kernels.linalg.rows import swap
-from solvers.kernels.linalg.space import View, assign, fill, integers, matrix, vector
+from solvers.kernels.linalg.space import assign, fill, integers, matrix, vector
 from solvers.kernels.tolerances import CANCELLED, CLEAR_SQUARE, EPSILON, FAINT, FLOOR, NEGLIGIBLE
 from solvers.status import EQUAL
 
@@ -54,19 +54,12 @@ SETTLED, TURNING, BASE, FIX, HARD, RANKS, ROWS, MISSED, STEPS = range(9)
 # what of the sum of its rows' pulls may be rounding; the largest number of a whole step.
 SIZE, SCALE, WEIGHT, ROUNDING, REACH = range(5)
 
+Tableau = namedtuple("Tableau", "of count scalar M room")
+"""The data of a solve level by level.
 
-class Tableau(NamedTuple):
-    """The data of a solve level by level.
-
-    of: the WorkingSet whose data it shares. count, scalar: see above. M (n, g + n), g the number of
-    rows with more than one entry. room: scratch.
-    """
-
-    of: View
-    count: View
-    scalar: View
-    M: View
-    room: View
+of: the WorkingSet whose data it shares. count, scalar: see above. M (n, g + n), g the number of
+rows with more than one entry. room: scratch.
+"""
 
 
 @inlined

@@ -11,14 +11,14 @@ is cut from it, and stays so for the rest of the solve: so all working sets belo
 within `rank_tolerance` of each row.
 """
 
-from typing import NamedTuple
+from collections import namedtuple
 
 import numpy as np
 
 from hierarchy.jit import as_matrix, inlined, inner_product, internal
 from solvers.kernels.linalg.least_squares import substitute_back, triangularise, turn
 from solvers.kernels.linalg.rows import factor_level, only_entry, reflect, reflect_back, swap
-from solvers.kernels.linalg.space import Rows, View, assign, fill, integers, matrix, vector
+from solvers.kernels.linalg.space import Rows, assign, fill, integers, matrix, vector
 from solvers.kernels.tolerances import CANCELLED, LEAST_SQUARE, NEGLIGIBLE, SPARED
 from solvers.status import EQUAL, FREE, NUMERICAL_FAILURE, SOLVED, UNPROVED
 
@@ -51,28 +51,15 @@ PICKED, WHOLE, DIRTY, NEGLECTED, FINISHED, SEEN_LAST, FACTORED, SOUND = range(8)
 TOLERANCE, SIZE, PIVOT, SECOND, SCALE = range(5)
 _LARGEST = 2.0**1023  # power of two
 
+WorkingSet = namedtuple("WorkingSet", "A x number index count scalar multiplier W basis T C")
+"""The data of a solve.
 
-class WorkingSet(NamedTuple):
-    """The data of a solve.
-
-    A (m, n), x (n,). number, index (.., w), w the largest of m, n, L + 1; count, scalar: see above.
-    multiplier (L + 1, m): of each row in each level, and in its own level its violation
-    a x - side. W (m, n): the listed rows in coordinates of Q. basis: the reflectors of Q. T (n m,):
-    the columns of each level with more rows than rank, from m times its first column on. C (m, n):
-    the rows that were cut.
-    """
-
-    A: View
-    x: View
-    number: View
-    index: View
-    count: View
-    scalar: View
-    multiplier: View
-    W: View
-    basis: View
-    T: View
-    C: View
+A (m, n), x (n,). number, index (.., w), w the largest of m, n, L + 1; count, scalar: see above.
+multiplier (L + 1, m): of each row in each level, and in its own level its violation
+a x - side. W (m, n): the listed rows in coordinates of Q. basis: the reflectors of Q. T (n m,):
+the columns of each level with more rows than rank, from m times its first column on. C (m, n):
+the rows that were cut.
+"""
 
 
 @inlined
