@@ -10,9 +10,14 @@ from collections import namedtuple
 import numpy as np
 
 from hierarchy.jit import add_multiple, as_matrix, compiled, inlined, inner_product, internal
-from solvers.kernels.linalg.block import invert_triangle, orthogonalise_rows, smallest_square
+from solvers.kernels.linalg.block import (
+    invert_triangle,
+    orthogonalise_rows,
+    smallest_square,
+    solve_damped_level,
+)
 from solvers.kernels.linalg.rows import finish, load_rows, make_reflector, reflect, reflect_back
-from solvers.kernels.linalg.space import assign, fill, integers, matrix, shared, vector
+from solvers.kernels.linalg.space import Block, assign, fill, integers, matrix, shared, vector
 from solvers.kernels.staircase import carve_staircase, climb
 from solvers.status import SOLVED, TOO_SMALL
 
@@ -45,7 +50,7 @@ def solve_as_published(A, lower, upper, sizes, x, settings, work):
     """Solve (14) with F of (10); arguments and return codes as in `solve_by_staircase`."""
     m, n = A.shape
     matrices, at = _carve(work, m, n)
-    _, end = carve_staircase(work, at + 4, m, n)  # 4: the numbers of `_write_least`
+    _, end = carve_staircase(work, at + 4, m, n)  # 4: a level and its settings
     if end > work.size:
         return TOO_SMALL
     settings, u = shared(settings), matrices.u
@@ -62,32 +67,17 @@ def solve_as_published(A, lower, upper, sizes, x, settings, work):
             u[i] += matrices.F[k, i] * lower[k]  # F p - J q0, of (14); F here is its transpose
     fill(matrices.of_x[0], 0.0)
     if square * tolerance * tolerance < 1.0:  # sigma_min(R) >= 1 / ||R^-1||_F > tolerance
-        _write_inverse(matrices)
+        of_x = matrices.of_x  # J^# u = Q [R^-T u; 0] (11)
+        solve_damped_level(matrices.R, u, of_x[0], Block(0, m, 0, m), 0.0, matrices.rest)
+        reflect_back(matrices.basis, 0, m, of_x, 0, 1)
     else:
-        code = _write_least(A, matrices, settings, work[at:])
+        whole, at = integers(work, at, 1)  # all rows as one level
+        undamped, at = vector(work, at, 3)
+        undamped[0], undamped[1], undamped[2] = 0.0, settings.threshold, settings.rank_tolerance
+        whole[0] = m
+        code, _ = climb(A, u, u, whole, matrices.of_x[0, :n], undamped, work[at:])
     add_multiple(x, 1.0, matrices.of_x[0, :n])
     return finish(x, code)
-
-
-@inlined
-def _write_inverse(matrices):
-    """Write J^# u = Q [R^-T u; 0] (11)."""
-    u, of_x, m = matrices.u, matrices.of_x, matrices.u.size
-    for i in range(m):
-        u[i] = (u[i] - inner_product(u[:i], matrices.R[i])) / matrices.R[i, i]
-        of_x[0, i] = u[i]
-    reflect_back(matrices.basis, 0, m, of_x, 0, 1)
-
-
-@inlined
-def _write_least(A, matrices, settings, work):
-    """Write J^# u, at any rank; return the code of the staircase that finds it."""
-    whole, at = integers(work, 0, 1)  # all rows as one level
-    undamped, at = vector(work, at, 3)
-    undamped[0], undamped[1], undamped[2] = 0.0, settings.threshold, settings.rank_tolerance
-    u, whole[0] = matrices.u, A.shape[0]
-    code, _ = climb(A, u, u, whole, matrices.of_x[0, :A.shape[1]], undamped, work[at:])
-    return code
 
 
 @internal
@@ -98,7 +88,18 @@ def _fill(A, lower, upper, sizes, x, matrices, settings):
     code = load_rows(R, zero, A, lower, upper, x, settings.rank_tolerance)
     if code != SOLVED:
         return code
-    _factor(R, basis, zero, n)  # (8)
+    for i in range(m):
+        fill(R[i, n:], 0.0)
+    for k in range(m):  # the QR of J^T: R is J before and R^T after it (8)
+        square = 0.0
+        fill(basis[k], 0.0)
+        for c in range(k, R.shape[1]):
+            square += R[k, c] * R[k, c]
+        if square <= zero[k]:  # no remainder: rounding must not choose a direction
+            fill(R[k, k:], 0.0)
+        else:
+            make_reflector(basis, k, R[k], square)
+            reflect(basis, k, k + 1, R, k, m)
     invert_triangle(R, T, 0, 0, m)
     for i in range(m):
         for k in range(m):
@@ -113,24 +114,6 @@ def _fill(A, lower, upper, sizes, x, matrices, settings):
         _eliminate(F, D, entries, first, last)
         first = last
     return SOLVED
-
-
-@inlined
-def _factor(R, basis, zero, n):
-    """Compute the QR of J^T; R is J on entry and R^T on return (8)."""
-    m, N = R.shape
-    for i in range(m):
-        fill(R[i, n:], 0.0)
-    for k in range(m):
-        square = 0.0
-        fill(basis[k], 0.0)
-        for c in range(k, N):
-            square += R[k, c] * R[k, c]
-        if square <= zero[k]:  # no remainder: rounding must not choose a direction
-            fill(R[k, k:], 0.0)
-        else:
-            make_reflector(basis, k, R[k], square)
-            reflect(basis, k, k + 1, R, k, m)
 
 
 @inlined

@@ -104,7 +104,12 @@ def climb(A, lower, upper, sizes, x, settings, work):
             rows.miss[i] -= inner_product(y[:above], rows.W[i])  # p_i - J_i x_{i-1}, in (13)
         solve_level(rows.W, rows.miss, y, block, settings, of_block)
         first = last
-    _to_unknowns(basis, y, rank, x, of_x)
+    assign(of_x[0], x)
+    if x.any():
+        reflect(basis, 0, rank, of_x, 0, 1)
+    assign(of_x[0, :rank], y)  # and the rest of the reference: (7) and (14)
+    reflect_back(basis, 0, rank, of_x, 0, 1)
+    assign(x, of_x[0])
     least = 0.0 if has_outlier(rows.zero, FAR_LIGHTER * FAR_LIGHTER) else least
     return finish(x, SOLVED), np.sqrt(least) * settings.rank_tolerance
 
@@ -129,17 +134,3 @@ def smallest_pivot(rows, block, least):
         square, zero = rows.W[i, k] * rows.W[i, k], rows.zero[i]
         least = min(least, square / zero) if zero > 0.0 else least
     return least
-
-
-@inlined
-def _to_unknowns(basis, y, rank, x, of_x):
-    """Replace the reference x by Q [y; rest], with the rest of the reference: (7) and (14)."""
-    zero_reference = True
-    for c in range(x.size):
-        of_x[0, c] = x[c]
-        zero_reference &= x[c] == 0.0
-    if not zero_reference:
-        reflect(basis, 0, rank, of_x, 0, 1)
-    assign(of_x[0, :rank], y)
-    reflect_back(basis, 0, rank, of_x, 0, 1)
-    assign(x, of_x[0])
