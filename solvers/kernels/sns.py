@@ -218,7 +218,7 @@ def _level(task, x, space, above):
         s, critical = _scaling(space)
         if s >= max(largest, 0.0) and _improves(x, space, at, s):
             largest = s
-        if space.release and _release(space, at, s if s >= 0.0 else 1.0):
+        if space.release and _release(space, at, s if s >= 0.0 else 1.0, False):
             _see(task, space.basis, seen, above)
             taken = _hold_again(space, seen, x, above, taken)
             continue
@@ -335,14 +335,15 @@ def _scaling(space):
 
 
 @internal
-def _release(space, at, s):
+def _release(space, at, s, alone):
     """Release saturated joints whose multiplier has the wrong sign; return whether there were any.
 
     The multipliers are those of the least ||x_k - x_{k-1}|| with J_k x_k and the joints as they
-    are: y + F^T nu + E^T mu = 0, where mu must push a joint against its bound.
+    are: y + F^T nu + E^T mu = 0, where mu must push a joint against its bound. alone: whether only
+    the worst is released.
     """
     W, E, y, y_a, above, begin = space.rows.W, space.E, space.y, space.y_a, at.above, at.joints
-    size = 0.0
+    size, worst, wrong = 0.0, 0.0, NO_JOINT
     for k in range(above, at.task):
         size = max(size, abs(y[k] + s * y_a[k]) if k >= begin else abs(y[k]))
     for k in range(at.task - 1, above - 1, -1):  # nu, then mu, take the place of y_a
@@ -352,13 +353,14 @@ def _release(space, at, s):
         for i in range(k + 1, begin):
             pull -= E[i - above, k] * y_a[i]
         y_a[k] = pull / (W[k - begin, k] if k >= begin else E[k - above, k])
-    wrong = False
-    for t in range(begin - above):
-        j = space.joint[t]
-        if y_a[above + t] * space.side[j] < -BOUND_KEPT * size:
-            space.side[j] = 0.0
-            wrong = True
-    return wrong
+    for t in range(begin - above - 1, -1, -1):
+        push = y_a[above + t] * space.side[space.joint[t]]
+        if push < worst - BOUND_KEPT * size:
+            wrong, worst = space.joint[t], push if alone else 0.0
+            space.side[wrong] = space.side[wrong] if alone else 0.0
+    if wrong != NO_JOINT:
+        space.side[wrong] = 0.0
+    return wrong != NO_JOINT
 
 
 @internal
@@ -412,30 +414,23 @@ def _to_reference(space, x, rank):
     while steps < 4 * n + 2:
         steps += 1
         begin = rank + count
-        _free_way(space, x, target, begin)
+        for j in range(n):
+            d[j] = target[j] - x[j]
+        reflect(space.basis, 0, begin, ways, 0, 1)
+        for k in range(begin):  # the step that joints and tasks take from the way to the target
+            space.y[k], d[k] = -d[k], 0.0
+        reflect_back(space.basis, 0, begin, ways, 0, 1)
         stopped = _step(x, d, space)
         if stopped != NO_JOINT:
             space.side[stopped] = 1.0 if d[stopped] > 0.0 else -1.0
             count = _hold(space, no_rows, stopped, x, rank, count)
             if rank + count == begin:
                 break
-        elif release and _drop(space, rank, begin):
+        elif release and _release(space, Columns(rank, begin, begin), 0.0, True):
             count = _hold_again(space, no_rows, x, rank, count)
         else:
             break
     return steps
-
-
-@inlined
-def _free_way(space, x, target, begin):
-    """Write the step from x to the target in columns `begin` and on; the other columns to y."""
-    ways, d = space.line, space.line[0]
-    for j in range(x.size):
-        d[j] = target[j] - x[j]
-    reflect(space.basis, 0, begin, ways, 0, 1)
-    for k in range(begin):
-        space.y[k], d[k] = d[k], 0.0
-    reflect_back(space.basis, 0, begin, ways, 0, 1)
 
 
 @inlined
@@ -457,26 +452,3 @@ def _step(x, d, space):
     if stopped != NO_JOINT:
         x[stopped] = space.up[stopped] if d[stopped] > 0.0 else space.low[stopped]
     return stopped
-
-
-@inlined
-def _drop(space, rank, begin):
-    """Release the held joint that the step to the reference pulls inward most, if there is one.
-
-    y[rank:begin] is that step in the columns of the held joints on entry, multipliers on return.
-    """
-    y, E = space.y, space.E
-    size, worst, at = 0.0, 0.0, NO_JOINT
-    for k in range(rank, begin):
-        size = max(size, abs(y[k]))
-    for k in range(begin - 1, rank - 1, -1):
-        for i in range(k + 1, begin):
-            y[k] -= E[i - rank, k] * y[i]
-        y[k] /= E[k - rank, k]
-        j = space.joint[k - rank]
-        if y[k] * space.side[j] < worst - BOUND_KEPT * size:
-            worst, at = y[k] * space.side[j], j
-    if at == NO_JOINT:
-        return False
-    space.side[at] = 0.0
-    return True
