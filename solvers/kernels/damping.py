@@ -42,12 +42,6 @@ staircase that each level adds, in its rows of E. free (n,): the x that meets th
 
 
 @inlined
-def damped_size(n, m, levels):
-    """Return the numbers that a Damped and its staircase need."""
-    return (3 * m + n) * (n + 3) + 4 * levels + n + (m + n) * (n + 3) + (m + n) * (n + 1)
-
-
-@inlined
 def carve_damped(work, m, n, levels):
     """Return a Damped without data, and where it ends."""
     A, at = matrix(work, 0, m + n, n)
@@ -74,7 +68,8 @@ def open_damped(d, A, lower, upper, sizes, x, settings, work):
     for k in range(sizes.size):
         d.sizes[k], begin = sizes[k], count
         for i in range(first, first + sizes[k]):
-            _copy_row(d, A, lower, upper, i)
+            assign(d.A[i], A[i])
+            d.lower[i], d.upper[i] = lower[i], upper[i]
             if lower[i] == upper[i]:
                 assign(d.E[count], A[i])
                 d.b[count] = lower[i]
@@ -90,13 +85,6 @@ def open_damped(d, A, lower, upper, sizes, x, settings, work):
     _take_out_exceeded(d, E, A, lower, upper, x)
     _factor_equalities(d, A, sizes, settings, work, False)
     return UNPROVED
-
-
-@inlined
-def _copy_row(d, A, lower, upper, i):
-    """Write row i of the hierarchy."""
-    assign(d.A[i], A[i])
-    d.lower[i], d.upper[i] = lower[i], upper[i]
 
 
 @inlined
@@ -175,7 +163,8 @@ def keep_reached(d, A, lower, upper, x, k, end):
     The levels above keep theirs, and the rows from `end` on get their data back.
     """
     for i in range(end, lower.size):
-        _copy_row(d, A, lower, upper, i)
+        assign(d.A[i], A[i])
+        d.lower[i], d.upper[i] = lower[i], upper[i]
     begin, t = 0, 0
     for j in range(k):
         begin, t = begin + d.sizes[j], t + d.ends[j]

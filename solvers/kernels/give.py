@@ -97,7 +97,9 @@ def _find_witnesses(s, g, record, settings, work):
     code, count, found, at, room, accurate = SOLVED, 0, 0, 0, 0, True
     for k in range(s.multiplier.shape[0] - 1):
         count = k + 1 if _gives(s, g, k) else count
-    part, size = _first_levels(s, count), record.size // g.witnesses.shape[0]
+    size, rows = record.size // g.witnesses.shape[0], s.A[:s.index[FIRST, count]]
+    part = WorkingSet(rows, s.x, s.number, s.index, s.count, s.scalar, s.multiplier[:count + 1],
+                      s.W, s.basis, s.T, s.C)  # of the first levels, in the same memory
     for k in range(count):
         if code in (SOLVED, INACCURATE) and _gives(s, g, k):
             if at == 0 or misses(g.A, g.lower, g.upper, s.x, room, s.index[FIRST, k + 1]):
@@ -116,13 +118,6 @@ def _find_witnesses(s, g, record, settings, work):
 def _gives(s, g, k):
     """Whether one of the rows of a level gives."""
     return g.give[s.index[FIRST, k]:s.index[FIRST, k + 1]].any()
-
-
-@inlined
-def _first_levels(s, count):
-    """Return the working set of the first levels, in the same memory."""
-    return WorkingSet(s.A[:s.index[FIRST, count]], s.x, s.number, s.index, s.count, s.scalar,
-                      s.multiplier[:count + 1], s.W, s.basis, s.T, s.C)
 
 
 @inlined

@@ -18,16 +18,21 @@ import numpy as np
 
 from hierarchy.jit import add_multiple, as_matrix, inlined, inner_product, internal
 from solvers.kernels.active_set.working_set import (
+    ACTED,
     CUT,
     ENTRY,
+    FACTORED,
     FIRST,
     LOWER,
     NORM,
+    PIVOT,
     REFERENCE,
+    SECOND,
     STATE,
     TOLERANCE,
     UNIT,
     UPPER,
+    WHOLE,
     note_pivot,
     side_at,
 )
@@ -35,7 +40,7 @@ from solvers.kernels.linalg.least_squares import least_squares
 from solvers.kernels.linalg.rows import swap
 from solvers.kernels.linalg.space import assign, fill, integers, matrix, vector
 from solvers.kernels.tolerances import CANCELLED, CLEAR_SQUARE, EPSILON, FAINT, FLOOR, NEGLIGIBLE
-from solvers.status import EQUAL
+from solvers.status import EQUAL, FREE
 
 # Rows of `number` after those of the data. Per row of A: its value and the rate of that; its
 # residual before the step of its level and its excess after (in the order of the list). Per unknown
@@ -63,12 +68,6 @@ rows with more than one entry. room: scratch.
 
 
 @inlined
-def tableau_size(n, m):
-    """Return the numbers that a Tableau needs: M, and the least squares of all rows."""
-    return 16 + n * (m + n) + (m + n) * (n + 3)
-
-
-@inlined
 def carve_tableau(s, work):
     """Return a Tableau of a WorkingSet."""
     m, n = s.A.shape
@@ -82,16 +81,29 @@ def carve_tableau(s, work):
 
 
 @internal
-def open_tableau(t):
-    """Write M for Q = I, with the columns of the equalities."""
+def open_tableau(t, seeded):
+    """Start at x and the rows that act, or at x = 0 with an empty working set, with Q = I.
+
+    Equalities have their columns of M.
+    """
     s, M, base = t.of, t.M, t.M.shape[1] - t.of.x.size
-    at = base
+    s.count[WHOLE], s.count[FACTORED], s.scalar[PIVOT], s.scalar[SECOND] = -1, 0, 1.0, 1.0
+    if not seeded:
+        fill(s.x, 0.0)
+    fill(t.count, 0)
+    fill(t.scalar, 0.0)
+    for p in range(s.multiplier.shape[0]):
+        fill(s.multiplier[p], 0.0)
     for r in range(s.x.size):
         fill(M[r, base:], 0.0)
         M[r, base + r] = 1.0
+    at = base
     for i in range(s.A.shape[0]):
-        s.index[COLUMN, i] = base + s.index[UNIT, i] if s.index[UNIT, i] >= 0 else -1
-        if s.index[COLUMN, i] < 0 and s.index[STATE, i] == EQUAL:
+        s.index[KIND, i], s.number[VALUE, i], unit = 0, 0.0, s.index[UNIT, i]
+        s.index[ACTED, i], s.index[COLUMN, i] = s.index[STATE, i], base + unit if unit >= 0 else -1
+        if s.index[STATE, i] != EQUAL:
+            s.index[STATE, i] = FREE
+        elif unit < 0:
             at -= 1
             s.index[COLUMN, i], s.index[ROW, at] = at, i
             assign(M[:, at], s.A[i])
@@ -106,34 +118,6 @@ def add_column(t, i):
         s.index[COLUMN, i], s.index[ROW, at], t.count[TURNING] = at, i, at
         for r in range(s.x.size):
             t.M[r, at] = inner_product(s.A[i], t.M[r, t.count[BASE]:])
-
-
-@inlined
-def close_column(t, at, settled):
-    """Take a column from those that turn, to the settled or away; the first fills its place."""
-    s, M, first, to = t.of, t.M, t.count[TURNING], t.count[SETTLED]
-    i, other = s.index[ROW, at], s.index[ROW, first]
-    for r in range(s.x.size):
-        entry = M[r, at]
-        M[r, at] = M[r, first]
-        if settled:
-            M[r, to] = entry
-    s.index[COLUMN, other], s.index[ROW, at] = at, other
-    s.index[COLUMN, i] = to if settled else -1
-    t.count[TURNING] += 1
-    t.count[SETTLED] += settled
-
-
-@inlined
-def turn_to(t, k, end, i):
-    """Reflect basis vectors k .. end - 1 so that row i has nothing in them beyond the first."""
-    reflect_columns(t.M, k, end, t.of.index[COLUMN, i], t.count[TURNING], t.room)
-
-
-@inlined
-def fold_to(t, k, i):
-    """Rotate basis vectors k and k + 1 so that row i has nothing in the second."""
-    fold(t.M, k, t.of.index[COLUMN, i], t.count[TURNING])
 
 
 @internal
@@ -232,7 +216,8 @@ def pivot_rows(t, begin, rank):
         swap(rows, rank, best)
         swap(left, rank, best)
         is_independent(t, rows[rank], largest)
-        turn_to(t, begin + rank, n, rows[rank])
+        column = s.index[COLUMN, rows[rank]]
+        reflect_columns(t.M, begin + rank, n, column, t.count[TURNING], t.room)
         rank += 1
         for q in range(rank, count):
             left[q] -= (entry_of(t, rows[q]) * t.M[begin + rank - 1, s.index[COLUMN, rows[q]]]) ** 2

@@ -122,7 +122,9 @@ def _rows_hold(s, reach):
         cut = max(cut, s.number[CUT, i] / norm)
         if s.index[STATE, i] in (EQUAL, FREE):
             s.index[CHANGE, i] = DECIDED
-    return _ranks_are_clear(s, cut)
+    # No row would be dependent or not by an angle near the tolerance.
+    return (RANK_MARGIN * cut <= s.scalar[TOLERANCE] <= s.scalar[PIVOT] / RANK_MARGIN
+            and s.scalar[PIVOT] * s.scalar[SECOND] >= PIVOT_PRODUCT)
 
 
 @inlined
@@ -137,12 +139,6 @@ def _row_holds(s, k, i, reach):
     shift = BAND * s.number[NORM, i] + s.number[CUT, i]
     return beyond <= shift * reach + EPSILON * terms
 
-
-@inlined
-def _ranks_are_clear(s, cut):
-    """Whether no row would be dependent or not by an angle near the tolerance."""
-    return (RANK_MARGIN * cut <= s.scalar[TOLERANCE] <= s.scalar[PIVOT] / RANK_MARGIN
-            and s.scalar[PIVOT] * s.scalar[SECOND] >= PIVOT_PRODUCT)
 
 Level = namedtuple("Level", "p begin end least far missed source unsure")
 """A level p to verify: its rows, and what they have in common.

@@ -63,12 +63,6 @@ the rows that were cut.
 
 
 @inlined
-def working_set_size(n, m, levels):
-    """Return the numbers that a WorkingSet needs, without its multipliers."""
-    return (NUMBERS + INDICES) * max(m, n, levels + 1) + 16 + 3 * m * n + n * n
-
-
-@inlined
 def carve_working_set(A, sizes, x, multiplier, work, at):
     """Return a WorkingSet without data, and where it ends."""
     m, n = A.shape
@@ -203,7 +197,8 @@ def restore(s):
 
 @internal
 def take_up(s):
-    """Give the rows that are negligible beside those of other levels their norms."""
+    """Give all rows back what was cut, and those negligible beside other levels their norms."""
+    restore(s)
     s.count[NEGLECTED] = s.count[FACTORED] = 0
     for i in range(s.A.shape[0]):
         s.number[NORM, i] = abs(s.number[NORM, i])
@@ -252,7 +247,9 @@ def meet(s, last):
                 index[LIST, rows] = i
                 rows += 1
         if rows > begin:
-            index[SHORT, k] = _is_short(s, begin, rows, rank)
+            left = s.x.size - rank  # columns, where so few are left that they cost less than rows
+            few = rank > s.count[PICKED] and 2 * left < s.x.size
+            index[SHORT, k] = few and left + SPARED < rows - begin
             above, rank = rank, _factor(s, begin, rows, rank, index[SHORT, k] == 1)
             _solve(s, begin, rows, above, rank, index[SHORT, k] == 1)
     _note_factors(s, levels, rows, rank)
@@ -307,14 +304,6 @@ def gives_all(s, k, goal, seen):
         seen[c] = 1.0
         goal[c] = s.number[LOWER, i] / s.number[ENTRY, i]
     return True
-
-
-@inlined
-def _is_short(s, begin, end, rank):
-    """Whether a level has so few columns left that these cost less than its rows."""
-    left = s.x.size - rank
-    few = rank > s.count[PICKED]
-    return few and 2 * left < s.x.size and left + SPARED < end - begin
 
 
 @inlined
@@ -451,7 +440,11 @@ def _solve(s, begin, end, above, rank, short):
                 rest -= s.W[begin + t - above, c] * y[c]
             y[t], miss[begin + t - above] = rest / s.W[begin + t - above, t], 0.0
     elif rank > above:
-        T, _ = _triangle(s, begin, end, above, rank)
+        T, _ = matrix(s.T, above * s.W.shape[0], rank - above, end - begin)
+        for k in range(T.shape[0]):
+            for i in range(T.shape[1]):
+                T[k, i] = s.W[begin + i, above + k] if k <= i else 0.0
+        triangularise(T, s.number[DIAGONAL, above:])
         s.scalar[SIZE] = max(s.scalar[SIZE], most / norm)  # sides may cancel to their rounding
         turn(T, miss[begin:], False)
         for t in range(above, rank):
@@ -465,27 +458,14 @@ def _solve(s, begin, end, above, rank, short):
 
 
 @inlined
-def _triangle(s, begin, end, above, rank):
-    """Make the columns of a level upper triangular; return them and where they end."""
-    T, at = matrix(s.T, above * s.W.shape[0], rank - above, end - begin)
-    for k in range(T.shape[0]):
-        for i in range(T.shape[1]):
-            T[k, i] = s.W[begin + i, above + k] if k <= i else 0.0
-    triangularise(T, s.number[DIAGONAL, above:])
-    return T, at
-
-
-@inlined
 def _keep_goal(s, rank):
     """Give y in the columns from `rank` on the goal."""
-    n, picked, order, moved, goal = s.x.size, s.count[PICKED], s.index[ORDER], False, s.number[GOAL]
-    for c in range(n):
-        s.number[SCRATCH, c] = goal[c]
-        moved |= goal[c] != 0.0
-    if moved:
+    n, goal, old = s.x.size, s.number[GOAL], s.number[SCRATCH]
+    if goal[:n].any():
+        assign(old[:n], goal)
         for t in range(n):
-            goal[t] = s.number[SCRATCH, order[t]]
-        reflect(s.basis, picked, rank, s.number, GOAL, GOAL + 1)
+            goal[t] = old[s.index[ORDER, t]]
+        reflect(s.basis, s.count[PICKED], rank, s.number, GOAL, GOAL + 1)
     assign(s.number[Y, rank:n], goal[rank:])
 
 
