@@ -54,10 +54,10 @@ def solve_as_published(A, lower, upper, sizes, x, settings, work):
     if end > work.size:
         return TOO_SMALL
     settings, u = shared(settings), matrices.u
-    code = _fill(A, lower, upper, sizes, x, matrices, settings)
+    code, tolerance = _fill(A, lower, upper, sizes, x, matrices, settings)
     if code != SOLVED:
         return finish(x, code)
-    tolerance, square = _tolerance(A, settings.rank_tolerance), 0.0
+    square = 0.0
     for i in range(m):
         u[i] = -inner_product(A[i], x)
         for k in range(i, m):
@@ -82,12 +82,15 @@ def solve_as_published(A, lower, upper, sizes, x, settings, work):
 
 @internal
 def _fill(A, lower, upper, sizes, x, matrices, settings):
-    """Write R, its reflectors, F and T; return a code."""
+    """Write R, its reflectors, F and T; return a code, and the tolerance of singular values.
+
+    That is `rank_tolerance` times the largest norm of a row.
+    """
     m, n = A.shape
     R, basis, F, T, zero, rest = matrices[:6]
     code = load_rows(R, zero, A, lower, upper, x, settings.rank_tolerance)
     if code != SOLVED:
-        return code
+        return code, 0.0
     for i in range(m):
         fill(R[i, n:], 0.0)
     for k in range(m):  # the QR of J^T: R is J before and R^T after it (8)
@@ -104,8 +107,10 @@ def _fill(A, lower, upper, sizes, x, matrices, settings):
     for i in range(m):
         for k in range(m):
             F[i, k] = R[k, i] if k >= i else 0.0  # (9)
-    entries, of_pivot, tolerance = rest[:m], rest[m:], _tolerance(A, settings.rank_tolerance)
-    first = 0
+    entries, of_pivot, largest, first = rest[:m], rest[m:], 0.0, 0
+    for i in range(m):
+        largest = max(largest, inner_product(A[i], A[i]))
+    tolerance = settings.rank_tolerance * np.sqrt(largest)
     for level in range(sizes.size):
         last = first + sizes[level]
         p = last - first
@@ -113,7 +118,7 @@ def _fill(A, lower, upper, sizes, x, matrices, settings):
         _invert_pivot(F, T, first, settings, tolerance, D, of_pivot[D.size:])
         _eliminate(F, D, entries, first, last)
         first = last
-    return SOLVED
+    return SOLVED, tolerance
 
 
 @inlined
@@ -132,15 +137,6 @@ def _eliminate(F, D, entries, first, last):
         for j in range(p):
             for k in range(first, F.shape[1]):
                 F[i, k] -= entries[j] * F[first + j, k]
-
-
-@internal
-def _tolerance(A, rank_tolerance):
-    """Return the absolute tolerance of singular values: rank_tolerance times the largest norm."""
-    largest = 0.0
-    for i in range(A.shape[0]):
-        largest = max(largest, inner_product(A[i], A[i]))
-    return rank_tolerance * np.sqrt(largest)
 
 
 @internal
@@ -182,7 +178,7 @@ def matrix_as_published(A, lower, upper, sizes, F, settings, work):
     matrices, at = _carve(work, m, n)
     if at > work.size:
         return TOO_SMALL
-    code = _fill(A, lower, upper, sizes, work[:0], matrices, shared(settings))
+    code, _ = _fill(A, lower, upper, sizes, work[:0], matrices, shared(settings))
     for i in range(m):
         assign(F[i], matrices.F[i])
     return code
