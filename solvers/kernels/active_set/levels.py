@@ -80,7 +80,6 @@ from solvers.kernels.active_set.working_set import (
     product_with,
     side_at,
 )
-from solvers.kernels.linalg.rows import length_of
 from solvers.kernels.linalg.space import assign, fill
 from solvers.kernels.tolerances import CANCELLED, FLOOR, REPIVOT
 from solvers.status import EQUAL, FREE, SOLVED, UNPROVED
@@ -107,8 +106,9 @@ def pass_through_levels(t, tolerance, limit, seeded):
         whole = _sets_goal(t, k)
         if seeded:
             _hold_seeded(t, k, first, tolerance)
-        solved = not _begin(t, k, last, whole, tolerance)
-        while not solved:
+        begun = _begin(t, k, last, whole, tolerance)
+        missed = not whole and s.multiplier[k, first:last].any()
+        while begun:
             if t.count[STEPS] >= limit:
                 return UNPROVED, k
             t.count[STEPS] += 1
@@ -120,11 +120,18 @@ def pass_through_levels(t, tolerance, limit, seeded):
             elif leaving >= 0:
                 _leave(t, leaving, last, tolerance)
             else:
-                solved = True
-                _settle(t, k, whole)
-                _order(t, whole)
+                _settle(t, k)
+                missed = missed or t.count[MISSED] == 1
+                break
+        if missed:
+            _write_multipliers(t, k, whole)
+        if begun:
+            _order(t, whole)
+        _close_columns(t)
         if whole and k < levels:
             s.count[WHOLE] = k
+            for i in range(first, last):
+                s.multiplier[k, i] = s.number[ENTRY, i] * s.x[s.index[UNIT, i]] - side_at(s, i)
             break
     return SOLVED, -1
 
@@ -165,7 +172,7 @@ def _begin(t, k, last, whole, tolerance):
     A row with no remainder outside the fixed rows is settled.
     """
     s, count, n = t.of, t.count, t.of.x.size
-    measure(t, length_of(s.x))
+    measure(t)
     count[RANKS] = count[ROWS] = 0
     for i in range(s.index[FIRST, k] if k < s.multiplier.shape[0] - 1 else last, last):
         value = product_with(s, i, s.x)
@@ -186,10 +193,6 @@ def _begin(t, k, last, whole, tolerance):
         else:
             s.multiplier[k, i] = value - side_at(s, i)
     _watch_parallel(t, last)
-    if count[ROWS] == 0 and not whole:
-        if _has_misses(s, k):
-            _write_multipliers(t, k, whole)
-        _close_columns(t)
     return count[ROWS] > 0 or whole
 
 
@@ -328,7 +331,7 @@ def _enter(t, i, first):
 def _held_wrongly(t, whole, tolerance):
     """Write the forces of the held rows; return the row whose force is wrong the most, or -1."""
     s, begin, end = t.of, t.count[FIX], t.count[FIX] + t.count[HARD]
-    measure(t, length_of(s.x))
+    measure(t)
     fill(s.number[PULL, begin:end], 0.0)
     fill(s.number[FORCE, begin:end], 0.0)
     t.count[MISSED] = _misses_goal(t, tolerance) if whole else not weigh_rows(t) <= tolerance
@@ -418,7 +421,7 @@ def _remove(t, i):
 
 
 @inlined
-def _settle(t, k, whole):
+def _settle(t, k):
     """Turn the rows that a level decided into permanent equalities; its other rows stay held."""
     s, count, number, kind = t.of, t.count, t.of.number, t.of.index[KIND]
     fixed, end = count[FIX], count[FIX] + count[HARD]
@@ -427,7 +430,6 @@ def _settle(t, k, whole):
         i = s.index[OWNER, r]
         if missed and s.index[STATE, i] * number[FORCE, r] > 0.0:
             kind[i] = FIXED
-    missed_before = not whole and _has_misses(s, k)
     for q in range(count[ROWS]):
         i, over = s.index[LIST, q], number[OVER, q]
         kind[i], s.multiplier[k, i] = FIXED, over if missed else 0.0
@@ -435,17 +437,6 @@ def _settle(t, k, whole):
             is_independent(t, i, left_of(t, i, end + count[RANKS], s.x.size))
         if s.index[STATE, i] != EQUAL and not s.index[STATE, i] * s.multiplier[k, i] > 0.0:
             kind[i], s.multiplier[k, i] = HELD, 0.0
-    if missed or missed_before:
-        _write_multipliers(t, k, whole)
-    if whole and k < s.multiplier.shape[0] - 1:
-        for i in range(s.index[FIRST, k], s.index[FIRST, k + 1]):
-            s.multiplier[k, i] = s.number[ENTRY, i] * s.x[s.index[UNIT, i]] - side_at(s, i)
-
-
-@inlined
-def _has_misses(s, k):
-    """Whether rows of level k are missed that were settled before its first step."""
-    return s.multiplier[k, s.index[FIRST, k]:s.index[FIRST, k + 1]].any()
 
 
 @inlined
@@ -474,7 +465,6 @@ def _order(t, whole):
                 kind[i], s.index[STATE, i] = WATCHED, FREE
                 s.number[VALUE, i] = product_with(s, i, s.x)
     count[HARD] = at - count[FIX]
-    _close_columns(t)
 
 
 @inlined

@@ -37,7 +37,7 @@ from solvers.kernels.active_set.working_set import (
     side_at,
 )
 from solvers.kernels.linalg.least_squares import least_squares
-from solvers.kernels.linalg.rows import swap
+from solvers.kernels.linalg.rows import length_of, swap
 from solvers.kernels.linalg.space import assign, fill, integers, matrix, vector
 from solvers.kernels.tolerances import CANCELLED, CLEAR_SQUARE, EPSILON, FAINT, FLOOR, NEGLIGIBLE
 from solvers.status import EQUAL, FREE
@@ -244,8 +244,9 @@ def missed_side(s, i, value, scale, tolerance):
 
 
 @inlined
-def measure(t, length):
+def measure(t):
     """Write the scale of tolerances: the length of x, but at least the size of rounding."""
+    length = length_of(t.of.x)
     t.scalar[SIZE] = max(t.scalar[SIZE], length)
     t.scalar[SCALE] = max(length, FLOOR * t.scalar[SIZE])
 
@@ -256,38 +257,28 @@ def step_of_rows(t, begin, rank):
 
     Independent rows are met. Returns the size of the largest numbers involved.
     """
-    if t.count[ROWS] > rank:
-        return _least_squares_step(t, begin, rank)
-    s, size, y = t.of, 0.0, t.of.number[Z, begin:]
-    for q in range(rank):
-        i, left = s.index[LIST, q], s.number[REST, q]
-        column, entry = s.index[COLUMN, i], entry_of(t, i)
-        diagonal = entry * t.M[begin + q, column]
-        size = max(size, abs(left / diagonal))
-        for c in range(q):
-            left -= entry * t.M[begin + c, column] * y[c]
-        y[q] = left / diagonal
-        s.number[OVER, q] = 0.0
-    return size
-
-
-@inlined
-def _least_squares_step(t, begin, rank):
-    """Like `step_of_rows`, for more rows than rank."""
     s, rows, size, y = t.of, t.count[ROWS], 0.0, t.of.number[Z, begin:]
     L = as_matrix(t.room[:rows * (rank + 1)], rank + 1, rows)
     for q in range(rows):
         i, rest = s.index[LIST, q], s.number[REST, q]
         column, entry, least = s.index[COLUMN, i], entry_of(t, i), s.scalar[TOLERANCE]
+        if rows == rank:
+            diagonal = entry * t.M[begin + q, column]
+            size = max(size, abs(rest / diagonal))
+            for c in range(q):
+                rest -= entry * t.M[begin + c, column] * y[c]
+            y[q], s.number[OVER, q] = rest / diagonal, 0.0
+            continue
         seen = left_of(t, i, begin, begin + rank) > (least * s.number[NORM, i]) ** 2
         for c in range(rank):  # entries of a row in the span of the rows above are rounding
             L[c, q] = entry * t.M[begin + c, column] if c <= q and seen else 0.0
         L[rank, q] = rest
         if q < rank:
             size = max(size, abs(rest / L[q, q]))
-    least_squares(L[:rank], L[rank], y)
-    for q in range(rows):
-        s.number[OVER, q] = -L[rank, q]
+    if rows > rank:
+        least_squares(L[:rank], L[rank], y)
+        for q in range(rows):
+            s.number[OVER, q] = -L[rank, q]
     return size
 
 
