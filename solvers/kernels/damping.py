@@ -14,7 +14,7 @@ depends on which of them act, and what a level hands down is unique: x is contin
 except where those of a row meet, which makes an equality of it.
 """
 
-from typing import NamedTuple
+from collections import namedtuple
 
 from hierarchy.jit import add_multiple, inlined, inner_product, internal
 from solvers.kernels.linalg.block import level_damping
@@ -26,38 +26,19 @@ from solvers.kernels.linalg.rows import (
     reflect,
     reflect_back,
 )
-from solvers.kernels.linalg.space import Block, View, assign, integers, matrix, shared, vector
+from solvers.kernels.linalg.space import Block, assign, integers, matrix, shared, vector
 from solvers.kernels.staircase import carve_staircase, solve_by_staircase
 from solvers.kernels.tolerances import LEVEL_MET, SATURATES
 from solvers.status import NUMERICAL_FAILURE, UNPROVED
 
+Damped = namedtuple("Damped", "A lower upper sizes factor E b ends Q ranks free")
+"""The rows of one level to damp and of those above it, and of the equalities alone.
 
-class Damped(NamedTuple):
-    """The rows of one level to damp and of those above it, and of the equalities alone.
-
-    A (m + n, n), lower, upper (m + n,), sizes (L,): m rows of the hierarchy, their sides as far as
-    they are met, then n rows of damping. factor (L,): lambda. E (m, n), b (m,), ends (L,): the
-    equalities, their targets, their number per level. Q (m, n), ranks (L,): the columns of the
-    staircase that each level adds, in its rows of E. free (n,): the x that meets the equalities.
-    """
-
-    A: View
-    lower: View
-    upper: View
-    sizes: View
-    factor: View
-    E: View
-    b: View
-    ends: View
-    Q: View
-    ranks: View
-    free: View
-
-
-@inlined
-def damped_size(n, m, levels):
-    """Return the numbers that a Damped and its staircase need."""
-    return (3 * m + n) * (n + 3) + 4 * levels + n + (m + n) * (n + 3) + (m + n) * (n + 1)
+A (m + n, n), lower, upper (m + n,), sizes (L,): m rows of the hierarchy, their sides as far as
+they are met, then n rows of damping. factor (L,): lambda. E (m, n), b (m,), ends (L,): the
+equalities, their targets, their number per level. Q (m, n), ranks (L,): the columns of the
+staircase that each level adds, in its rows of E. free (n,): the x that meets the equalities.
+"""
 
 
 @inlined
@@ -87,7 +68,8 @@ def open_damped(d, A, lower, upper, sizes, x, settings, work):
     for k in range(sizes.size):
         d.sizes[k], begin = sizes[k], count
         for i in range(first, first + sizes[k]):
-            _copy_row(d, A, lower, upper, i)
+            assign(d.A[i], A[i])
+            d.lower[i], d.upper[i] = lower[i], upper[i]
             if lower[i] == upper[i]:
                 assign(d.E[count], A[i])
                 d.b[count] = lower[i]
@@ -103,13 +85,6 @@ def open_damped(d, A, lower, upper, sizes, x, settings, work):
     _take_out_exceeded(d, E, A, lower, upper, x)
     _factor_equalities(d, A, sizes, settings, work, False)
     return UNPROVED
-
-
-@inlined
-def _copy_row(d, A, lower, upper, i):
-    """Write row i of the hierarchy."""
-    assign(d.A[i], A[i])
-    d.lower[i], d.upper[i] = lower[i], upper[i]
 
 
 @inlined
@@ -188,7 +163,8 @@ def keep_reached(d, A, lower, upper, x, k, end):
     The levels above keep theirs, and the rows from `end` on get their data back.
     """
     for i in range(end, lower.size):
-        _copy_row(d, A, lower, upper, i)
+        assign(d.A[i], A[i])
+        d.lower[i], d.upper[i] = lower[i], upper[i]
     begin, t = 0, 0
     for j in range(k):
         begin, t = begin + d.sizes[j], t + d.ends[j]

@@ -4,7 +4,7 @@
 the exact kernel: rows are loaded once, and levels in which the same rows act are factored once.
 """
 
-from typing import NamedTuple
+from collections import namedtuple
 
 import numpy as np
 
@@ -27,7 +27,7 @@ from solvers.kernels.active_set.working_set import (
     start_from,
 )
 from solvers.kernels.linalg.rows import finish, length_of
-from solvers.kernels.linalg.space import View, assign, fill
+from solvers.kernels.linalg.space import assign, fill
 from solvers.status import INACCURATE, NUMERICAL_FAILURE, SOLVED, TOO_SMALL
 
 _ROUNDING = 1e-10  # of a violation, relative to |a| (1 + |x|)
@@ -58,15 +58,8 @@ def relax(A, lower, upper, give, x, first, last):
         lower[i] -= room
         upper[i] += room
 
-
-class Giving(NamedTuple):
-    """Rows (m, n) and sides (m,) as they are; what rows give (m,); room for K witnesses (K, n)."""
-
-    A: View
-    lower: View
-    upper: View
-    give: View
-    witnesses: View
+Giving = namedtuple("Giving", "A lower upper give witnesses")
+"""Rows (m, n) and sides (m,) as they are; what rows give (m,); room for K witnesses (K, n)."""
 
 
 @compiled
@@ -104,7 +97,9 @@ def _find_witnesses(s, g, record, settings, work):
     code, count, found, at, room, accurate = SOLVED, 0, 0, 0, 0, True
     for k in range(s.multiplier.shape[0] - 1):
         count = k + 1 if _gives(s, g, k) else count
-    part, size = _first_levels(s, count), record.size // g.witnesses.shape[0]
+    size, rows = record.size // g.witnesses.shape[0], s.A[:s.index[FIRST, count]]
+    part = WorkingSet(rows, s.x, s.number, s.index, s.count, s.scalar, s.multiplier[:count + 1],
+                      s.W, s.basis, s.T, s.C)  # of the first levels, in the same memory
     for k in range(count):
         if code in (SOLVED, INACCURATE) and _gives(s, g, k):
             if at == 0 or misses(g.A, g.lower, g.upper, s.x, room, s.index[FIRST, k + 1]):
@@ -123,13 +118,6 @@ def _find_witnesses(s, g, record, settings, work):
 def _gives(s, g, k):
     """Whether one of the rows of a level gives."""
     return g.give[s.index[FIRST, k]:s.index[FIRST, k + 1]].any()
-
-
-@inlined
-def _first_levels(s, count):
-    """Return the working set of the first levels, in the same memory."""
-    return WorkingSet(s.A[:s.index[FIRST, count]], s.x, s.number, s.index, s.count, s.scalar,
-                      s.multiplier[:count + 1], s.W, s.basis, s.T, s.C)
 
 
 @inlined

@@ -12,14 +12,14 @@ does to a multiplier, y + step (b - a x), in the unit of the row; a miss beyond 
 step times cap. docs/theory/merged.md has the bounds.
 """
 
-from typing import NamedTuple
+from collections import namedtuple
 
 import numpy as np
 
 from hierarchy.jit import add_multiple, compiled, inlined, inner_product, internal
 from solvers.kernels.active_set.exact import DAMPING, solve, work_size
 from solvers.kernels.linalg.rows import only_entry
-from solvers.kernels.linalg.space import View, assign, fill, integers, matrix, vector
+from solvers.kernels.linalg.space import assign, fill, integers, matrix, vector
 from solvers.status import NUMERICAL_FAILURE, TOO_SMALL
 
 NOTHING = -1     # code: every level is strict
@@ -27,26 +27,14 @@ BY_RULE, TOP_LIMITS = -1.0, -2.0  # of strict levels: see `count_strict`
 EXACT = 5        # settings of `Hcod` at the start; then those of `Merged`
 OWN = 8          # settings before the weights
 
+Merged = namedtuple(
+    "Merged", "strict regularisation step weights caps A lower upper sizes own centre")
+"""The settings of `Merged`, weights and caps (L,), and the rows that are solved.
 
-class Merged(NamedTuple):
-    """The settings of `Merged`, weights and caps (L,), and the rows that are solved.
-
-    A (m + n, n), of which the first `m` and some more are written. own (n,): 1 for an unknown that
-    a row to merge names alone. centre (n,): with damping, the reference, from which x is then
-    counted.
-    """
-
-    strict: View
-    regularisation: View
-    step: View
-    weights: View
-    caps: View
-    A: View
-    lower: View
-    upper: View
-    sizes: View
-    own: View
-    centre: View
+A (m + n, n), of which the first `m` and some more are written. own (n,): 1 for an unknown that
+a row to merge names alone. centre (n,): with damping, the reference, from which x is then
+counted.
+"""
 
 
 @compiled

@@ -5,34 +5,29 @@ above the last loses rank it gives the answer of the recursion only if no lower 
 columns that are wasted. For m > n, zero columns extend J to a square matrix.
 """
 
-from typing import NamedTuple
+from collections import namedtuple
 
 import numpy as np
 
 from hierarchy.jit import add_multiple, as_matrix, compiled, inlined, inner_product, internal
-from solvers.kernels.linalg.block import invert_triangle, orthogonalise_rows, smallest_square
+from solvers.kernels.linalg.block import (
+    invert_triangle,
+    orthogonalise_rows,
+    smallest_square,
+    solve_damped_level,
+)
 from solvers.kernels.linalg.rows import finish, load_rows, make_reflector, reflect, reflect_back
-from solvers.kernels.linalg.space import View, assign, fill, integers, matrix, shared, vector
+from solvers.kernels.linalg.space import Block, assign, fill, integers, matrix, shared, vector
 from solvers.kernels.staircase import carve_staircase, climb
 from solvers.status import SOLVED, TOO_SMALL
 
+Matrices = namedtuple("Matrices", "R basis F T zero rest u of_x")
+"""The matrices from which F is computed, and F; N = max(m, n).
 
-class Matrices(NamedTuple):
-    """The matrices from which F is computed, and F; N = max(m, n).
-
-    R (m, N): R^T, the rows of J reflected. basis: the m reflectors of Q. F (m, m): F^T. T (m, m):
-    R^-1. zero (m,): squared norm at or below which a row is zero. rest: m + 3 m^2 numbers. u (m,),
-    of_x (1, N): intermediate results.
-    """
-
-    R: View
-    basis: View
-    F: View
-    T: View
-    zero: View
-    rest: View
-    u: View
-    of_x: View
+R (m, N): R^T, the rows of J reflected. basis: the m reflectors of Q. F (m, m): F^T. T (m, m):
+R^-1. zero (m,): squared norm at or below which a row is zero. rest: m + 3 m^2 numbers. u (m,),
+of_x (1, N): intermediate results.
+"""
 
 
 @inlined
@@ -55,14 +50,14 @@ def solve_as_published(A, lower, upper, sizes, x, settings, work):
     """Solve (14) with F of (10); arguments and return codes as in `solve_by_staircase`."""
     m, n = A.shape
     matrices, at = _carve(work, m, n)
-    _, end = carve_staircase(work, at + 4, m, n)  # 4: the numbers of `_write_least`
+    _, end = carve_staircase(work, at + 4, m, n)  # 4: a level and its settings
     if end > work.size:
         return TOO_SMALL
     settings, u = shared(settings), matrices.u
-    code = _fill(A, lower, upper, sizes, x, matrices, settings)
+    code, tolerance = _fill(A, lower, upper, sizes, x, matrices, settings)
     if code != SOLVED:
         return finish(x, code)
-    tolerance, square = _tolerance(A, settings.rank_tolerance), 0.0
+    square = 0.0
     for i in range(m):
         u[i] = -inner_product(A[i], x)
         for k in range(i, m):
@@ -72,49 +67,50 @@ def solve_as_published(A, lower, upper, sizes, x, settings, work):
             u[i] += matrices.F[k, i] * lower[k]  # F p - J q0, of (14); F here is its transpose
     fill(matrices.of_x[0], 0.0)
     if square * tolerance * tolerance < 1.0:  # sigma_min(R) >= 1 / ||R^-1||_F > tolerance
-        _write_inverse(matrices)
+        of_x = matrices.of_x  # J^# u = Q [R^-T u; 0] (11)
+        solve_damped_level(matrices.R, u, of_x[0], Block(0, m, 0, m), 0.0, matrices.rest)
+        reflect_back(matrices.basis, 0, m, of_x, 0, 1)
     else:
-        code = _write_least(A, matrices, settings, work[at:])
+        whole, at = integers(work, at, 1)  # all rows as one level
+        undamped, at = vector(work, at, 3)
+        undamped[0], undamped[1], undamped[2] = 0.0, settings.threshold, settings.rank_tolerance
+        whole[0] = m
+        code, _ = climb(A, u, u, whole, matrices.of_x[0, :n], undamped, work[at:])
     add_multiple(x, 1.0, matrices.of_x[0, :n])
     return finish(x, code)
 
 
-@inlined
-def _write_inverse(matrices):
-    """Write J^# u = Q [R^-T u; 0] (11)."""
-    u, of_x, m = matrices.u, matrices.of_x, matrices.u.size
-    for i in range(m):
-        u[i] = (u[i] - inner_product(u[:i], matrices.R[i])) / matrices.R[i, i]
-        of_x[0, i] = u[i]
-    reflect_back(matrices.basis, 0, m, of_x, 0, 1)
-
-
-@inlined
-def _write_least(A, matrices, settings, work):
-    """Write J^# u, at any rank; return the code of the staircase that finds it."""
-    whole, at = integers(work, 0, 1)  # all rows as one level
-    undamped, at = vector(work, at, 3)
-    undamped[0], undamped[1], undamped[2] = 0.0, settings.threshold, settings.rank_tolerance
-    u, whole[0] = matrices.u, A.shape[0]
-    code, _ = climb(A, u, u, whole, matrices.of_x[0, :A.shape[1]], undamped, work[at:])
-    return code
-
-
 @internal
 def _fill(A, lower, upper, sizes, x, matrices, settings):
-    """Write R, its reflectors, F and T; return a code."""
+    """Write R, its reflectors, F and T; return a code, and the tolerance of singular values.
+
+    That is `rank_tolerance` times the largest norm of a row.
+    """
     m, n = A.shape
     R, basis, F, T, zero, rest = matrices[:6]
     code = load_rows(R, zero, A, lower, upper, x, settings.rank_tolerance)
     if code != SOLVED:
-        return code
-    _factor(R, basis, zero, n)  # (8)
+        return code, 0.0
+    for i in range(m):
+        fill(R[i, n:], 0.0)
+    for k in range(m):  # the QR of J^T: R is J before and R^T after it (8)
+        square = 0.0
+        fill(basis[k], 0.0)
+        for c in range(k, R.shape[1]):
+            square += R[k, c] * R[k, c]
+        if square <= zero[k]:  # no remainder: rounding must not choose a direction
+            fill(R[k, k:], 0.0)
+        else:
+            make_reflector(basis, k, R[k], square)
+            reflect(basis, k, k + 1, R, k, m)
     invert_triangle(R, T, 0, 0, m)
     for i in range(m):
         for k in range(m):
             F[i, k] = R[k, i] if k >= i else 0.0  # (9)
-    entries, of_pivot, tolerance = rest[:m], rest[m:], _tolerance(A, settings.rank_tolerance)
-    first = 0
+    entries, of_pivot, largest, first = rest[:m], rest[m:], 0.0, 0
+    for i in range(m):
+        largest = max(largest, inner_product(A[i], A[i]))
+    tolerance = settings.rank_tolerance * np.sqrt(largest)
     for level in range(sizes.size):
         last = first + sizes[level]
         p = last - first
@@ -122,25 +118,7 @@ def _fill(A, lower, upper, sizes, x, matrices, settings):
         _invert_pivot(F, T, first, settings, tolerance, D, of_pivot[D.size:])
         _eliminate(F, D, entries, first, last)
         first = last
-    return SOLVED
-
-
-@inlined
-def _factor(R, basis, zero, n):
-    """Compute the QR of J^T; R is J on entry and R^T on return (8)."""
-    m, N = R.shape
-    for i in range(m):
-        fill(R[i, n:], 0.0)
-    for k in range(m):
-        square = 0.0
-        fill(basis[k], 0.0)
-        for c in range(k, N):
-            square += R[k, c] * R[k, c]
-        if square <= zero[k]:  # no remainder: rounding must not choose a direction
-            fill(R[k, k:], 0.0)
-        else:
-            make_reflector(basis, k, R[k], square)
-            reflect(basis, k, k + 1, R, k, m)
+    return SOLVED, tolerance
 
 
 @inlined
@@ -159,15 +137,6 @@ def _eliminate(F, D, entries, first, last):
         for j in range(p):
             for k in range(first, F.shape[1]):
                 F[i, k] -= entries[j] * F[first + j, k]
-
-
-@internal
-def _tolerance(A, rank_tolerance):
-    """Return the absolute tolerance of singular values: rank_tolerance times the largest norm."""
-    largest = 0.0
-    for i in range(A.shape[0]):
-        largest = max(largest, inner_product(A[i], A[i]))
-    return rank_tolerance * np.sqrt(largest)
 
 
 @internal
@@ -209,7 +178,7 @@ def matrix_as_published(A, lower, upper, sizes, F, settings, work):
     matrices, at = _carve(work, m, n)
     if at > work.size:
         return TOO_SMALL
-    code = _fill(A, lower, upper, sizes, work[:0], matrices, shared(settings))
+    code, _ = _fill(A, lower, upper, sizes, work[:0], matrices, shared(settings))
     for i in range(m):
         assign(F[i], matrices.F[i])
     return code

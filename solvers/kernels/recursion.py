@@ -7,17 +7,12 @@ The dampings of Nakamura, Chiaverini, and Buss and Kim act in the singular value
 B = J_i P_{i-1} = sum_k s_k u_k v_k^T. Projectors stay undamped: no level disturbs those above it.
 """
 
-from typing import NamedTuple
+from collections import namedtuple
 
 import numpy as np
 
 from hierarchy.jit import add_multiple, compiled, inlined, inner_product, internal
-from solvers.kernels.linalg.block import (
-    orthogonalise_rows,
-    smallest_square,
-    solve_damped_level,
-    solve_level,
-)
+from solvers.kernels.linalg.block import orthogonalise_rows, solve_damped_level, solve_level
 from solvers.kernels.linalg.rows import (
     finish,
     finish_unless_missed,
@@ -28,36 +23,21 @@ from solvers.kernels.linalg.rows import (
     swap,
     swap_rows,
 )
-from solvers.kernels.linalg.space import Block, View, assign, fill, matrix, shared, vector
+from solvers.kernels.linalg.space import Block, assign, fill, matrix, shared, vector
 from solvers.kernels.tolerances import NEGLIGIBLE, REMAINDER, SIGN_ROUNDING
 from solvers.status import INACCURATE, SOLVED, TOO_SMALL
 
 LEVEL, NAKAMURA, CHIAVERINI, SELECTIVE = 0.0, 1.0, 2.0, 3.0  # methods of `Recursive`, in order
 SHRUNK = 0.01  # squared norm of a remainder: smaller ones are projected a second time
 
+Inverse = namedtuple("Inverse", "method damping threshold isotropic largest")
+"""How to invert: the method, and settings as in `Recursive`, after the shared ones."""
 
-class Inverse(NamedTuple):
-    """How to invert: the method, and settings as in `Recursive`, after the shared ones."""
+Projected = namedtuple("Projected", "W C V P zero miss")
+"""Rows J_i P_{i-1} = C V, their residuals, and the projector.
 
-    method: View
-    damping: View
-    threshold: View
-    isotropic: View
-    largest: View
-
-
-class Projected(NamedTuple):
-    """Rows J_i P_{i-1} = C V, their residuals, and the projector.
-
-    W (m, n): the remainders of the rows. C (m, n), V (n, n), P (n, n). zero, miss (m,): see `Rows`.
-    """
-
-    W: View
-    C: View
-    V: View
-    P: View
-    zero: View
-    miss: View
+W (m, n): the remainders of the rows. C (m, n), V (n, n), P (n, n). zero, miss (m,): see `Rows`.
+"""
 
 
 @inlined
@@ -199,32 +179,28 @@ def _take_direction(rows, i, last, k, again):
     for j in range(v.size):
         add_multiple(rows.P[j], -v[j], v)  # (6)
 
+Singular = namedtuple("Singular", "S Y sizes step total")
+"""The decomposition of a level with p rows and rank r, and a step.
 
-class Singular(NamedTuple):
-    """The decomposition of a level with p rows and rank r, and a step.
-
-    S (r, p): row k is s_k u_k. Y (r, r): row k is v_k in coordinates of V. sizes (n,): norms of the
-    columns of B. step, total (n,): of one singular vector, and of the level.
-    """
-
-    S: View
-    Y: View
-    sizes: View
-    step: View
-    total: View
+S (r, p): row k is s_k u_k. Y (r, r): row k is v_k in coordinates of V. sizes (n,): norms of the
+columns of B. step, total (n,): of one singular vector, and of the level.
+"""
 
 
 @internal
 def invert(rows, y, at, inverse, work):
     """Write the damped step of one level into y.
 
-    work: what `recursion` has for it.
+    Of Chiaverini: sum_k s_k / (s_k^2 + beta^2 + [k smallest] lambda^2) v_k u_k^T r, with lambda^2 =
+    (1 - (s_m / epsilon)^2) lambda_max^2 for s_m < epsilon. A level that has lost rank has s_m = 0,
+    and nothing remains in that direction. work: what `recursion` has for it.
     """
-    if at.k1 == at.k0:
+    r, lost = at.k1 - at.k0, at.i1 - at.i0 > at.k1 - at.k0
+    if r == 0:
         return
     if inverse.method == NAKAMURA:  # lambda = lambda_0 (1 - w / w_0) for w = sqrt(det B B^T) < w_0
-        w = 1.0 if at.i1 - at.i0 == at.k1 - at.k0 else 0.0
-        for k in range(at.k1 - at.k0):
+        w = 0.0 if lost else 1.0
+        for k in range(r):
             w *= abs(rows.C[at.i0 + k, at.k0 + k])
         damped = inverse.damping * max(0.0, 1.0 - w / inverse.threshold)
         solve_damped_level(rows.C, rows.miss, y, at, damped, work)
@@ -233,12 +209,22 @@ def invert(rows, y, at, inverse, work):
     if inverse.method == SELECTIVE:
         _selective(rows, y, at, inverse, space)
         return
-    square = smallest_square(space.S) if at.i1 - at.i0 == at.k1 - at.k0 else 0.0
-    ratio = square / (inverse.threshold * inverse.threshold)
+    least, smallest = np.inf, 0
+    for k in range(r):
+        square, _ = _along(rows, at, space, k)
+        if square < least:
+            least, smallest = square, k
+    ratio = 0.0 if lost else least / (inverse.threshold * inverse.threshold)
     if (inverse.damping == 0.0 or ratio >= 1.0) and inverse.isotropic == 0.0:
         solve_damped_level(rows.C, rows.miss, y, at, 0.0, of_step)
         return
-    _filtered(rows, y, at, inverse, space)
+    extra = inverse.damping * inverse.damping * max(0.0, 1.0 - ratio)  # lambda^2
+    fill(y[at.k0:at.k1], 0.0)
+    for k in range(r):
+        square, part = _along(rows, at, space, k)
+        below = square + inverse.isotropic * inverse.isotropic
+        below += extra if k == smallest and not lost else 0.0
+        add_multiple(y[at.k0:], part / below, space.Y[k])
 
 
 @inlined
@@ -253,8 +239,8 @@ def _decomposed(rows, at, work):
     for k in range(r):
         for i in range(p):
             S[k, i] = rows.C[at.i0 + i, at.k0 + k]
-        for c in range(r):
-            Y[k, c] = 1.0 if k == c else 0.0
+        fill(Y[k], 0.0)
+        Y[k, k] = 1.0
     orthogonalise_rows(S, Y)
     return Singular(S, Y, sizes, step, total), work[end:]
 
@@ -267,29 +253,6 @@ def _along(rows, at, space, k):
 
 
 @inlined
-def _filtered(rows, y, at, inverse, space):
-    """Write sum_k s_k / (s_k^2 + beta^2 + [k smallest] lambda^2) v_k u_k^T r into y.
-
-    With lambda^2 = (1 - (s_m / epsilon)^2) lambda_max^2 for s_m < epsilon. A level that has lost
-    rank has s_m = 0, and nothing remains in that direction.
-    """
-    r, lost = at.k1 - at.k0, at.i1 - at.i0 > at.k1 - at.k0
-    least, smallest = np.inf, 0
-    for k in range(r):
-        square, _ = _along(rows, at, space, k)
-        if square < least:
-            least, smallest = square, k
-    ratio = least / (inverse.threshold * inverse.threshold)
-    extra = inverse.damping * inverse.damping * max(0.0, 1.0 - ratio)  # lambda^2
-    fill(y[at.k0:at.k1], 0.0)
-    for k in range(r):
-        square, part = _along(rows, at, space, k)
-        below = square + inverse.isotropic * inverse.isotropic
-        below += extra if k == smallest and not lost else 0.0
-        add_multiple(y[at.k0:], part / below, space.Y[k])
-
-
-@inlined
 def _selective(rows, y, at, inverse, space):
     """Write the selectively damped step: each singular vector has a largest step of its own.
 
@@ -297,7 +260,14 @@ def _selective(rows, y, at, inverse, space):
     and N_k = |u_k| = 1: a level counts as one end effector.
     """
     r, n = at.k1 - at.k0, rows.V.shape[1]
-    _write_sizes(rows, at, space)
+    for c in range(n):
+        total = 0.0
+        for i in range(at.i0, at.i1):
+            entry = 0.0
+            for k in range(at.k0, at.k1):
+                entry += rows.C[i, k] * rows.V[k, c]
+            total += entry * entry
+        space.sizes[c] = np.sqrt(total)
     fill(y[at.k0:at.k1], 0.0)
     fill(space.total, 0.0)
     for k in range(r):
@@ -324,16 +294,3 @@ def _share(v, factor, largest):
     for c in range(v.size):
         size = max(size, abs(factor * v[c]))
     return largest / size if size > largest else 1.0
-
-
-@inlined
-def _write_sizes(rows, at, space):
-    """Write the norms of the columns of B = C V."""
-    for c in range(space.sizes.size):
-        total = 0.0
-        for i in range(at.i0, at.i1):
-            entry = 0.0
-            for k in range(at.k0, at.k1):
-                entry += rows.C[i, k] * rows.V[k, c]
-            total += entry * entry
-        space.sizes[c] = np.sqrt(total)

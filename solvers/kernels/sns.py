@@ -7,7 +7,7 @@ joints, loses rank, the set with the largest s is the answer. Each task starts w
 No projector is formed here: saturated joints and the task have columns of Q, see `Space`.
 """
 
-from typing import NamedTuple
+from collections import namedtuple
 
 import numpy as np
 
@@ -28,9 +28,6 @@ from solvers.kernels.linalg.rows import (
 )
 from solvers.kernels.linalg.space import (
     Block,
-    Rows,
-    Settings,
-    View,
     assign,
     carve_rows,
     fill,
@@ -45,60 +42,29 @@ from solvers.status import CONTRADICTION, SOLVED, TOO_SMALL
 
 NO_JOINT = -1
 
+Task = namedtuple("Task", "J b zero")
+"""The rows of one task: J (p, n), b (p,); zero (p,): squared norms that count as zero."""
 
-class Task(NamedTuple):
-    """The rows of one task: J (p, n), b (p,); zero (p,): squared norms that count as zero."""
+Columns = namedtuple("Columns", "above joints task")
+"""Ends of the columns of Q: of the tasks above, the saturated joints, the task."""
 
-    J: View
-    b: View
-    zero: View
+Space = namedtuple(
+    "Space", "shared release of_miss low up reference unit basis E joint side y rows seen now zero"
+    " line y_a trial best of_block")
+"""Settings, the box, and intermediate results.
 
+release: whether saturated joints are released. of_miss: whether s scales the residual of a
+task instead of b. low, up, reference (n,). unit (1,): the largest |bound|, at most 1.
 
-class Columns(NamedTuple):
-    """Ends of the columns of Q: of the tasks above, the saturated joints, the task."""
+Q has columns for the tasks above, then one for each held joint in the order of holding; the
+rest is free. basis: its reflectors. E (n, n): unit vectors of the held joints, in coordinates
+of Q. joint (n,): their indices. side (n,): +1, -1 for a joint held at its upper, lower bound,
+else 0. y (n,): the step in each column of Q.
 
-    above: View
-    joints: View
-    task: View
-
-
-class Space(NamedTuple):
-    """Settings, the box, and intermediate results.
-
-    release: whether saturated joints are released. of_miss: whether s scales the residual of a
-    task instead of b. low, up, reference (n,). unit (1,): the largest |bound|, at most 1.
-
-    Q has columns for the tasks above, then one for each held joint in the order of holding; the
-    rest is free. basis: its reflectors. E (n, n): unit vectors of the held joints, in coordinates
-    of Q. joint (n,): their indices. side (n,): +1, -1 for a joint held at its upper, lower bound,
-    else 0. y (n,): the step in each column of Q.
-
-    rows: the factored rows of the task. seen (m, n): the same in Q, not factored. now (m,):
-    J_k x_{k-1}. zero (m,): of all tasks. line (2, n): a and c of x_k(s) = s a + c. y_a (n,): a in
-    Q. trial (1, n), best (n,): steps. of_block: work space of `solve_level`.
-    """
-
-    shared: Settings
-    release: View
-    of_miss: View
-    low: View
-    up: View
-    reference: View
-    unit: View
-    basis: View
-    E: View
-    joint: View
-    side: View
-    y: View
-    rows: Rows
-    seen: View
-    now: View
-    zero: View
-    line: View
-    y_a: View
-    trial: View
-    best: View
-    of_block: View
+rows: the factored rows of the task. seen (m, n): the same in Q, not factored. now (m,):
+J_k x_{k-1}. zero (m,): of all tasks. line (2, n): a and c of x_k(s) = s a + c. y_a (n,): a in
+Q. trial (1, n), best (n,): steps. of_block: work space of `solve_level`.
+"""
 
 
 @inlined
@@ -252,7 +218,7 @@ def _level(task, x, space, above):
         s, critical = _scaling(space)
         if s >= max(largest, 0.0) and _improves(x, space, at, s):
             largest = s
-        if space.release and _release(space, at, s if s >= 0.0 else 1.0):
+        if space.release and _release(space, at, s if s >= 0.0 else 1.0, False):
             _see(task, space.basis, seen, above)
             taken = _hold_again(space, seen, x, above, taken)
             continue
@@ -369,14 +335,15 @@ def _scaling(space):
 
 
 @internal
-def _release(space, at, s):
+def _release(space, at, s, alone):
     """Release saturated joints whose multiplier has the wrong sign; return whether there were any.
 
     The multipliers are those of the least ||x_k - x_{k-1}|| with J_k x_k and the joints as they
-    are: y + F^T nu + E^T mu = 0, where mu must push a joint against its bound.
+    are: y + F^T nu + E^T mu = 0, where mu must push a joint against its bound. alone: whether only
+    the worst is released.
     """
     W, E, y, y_a, above, begin = space.rows.W, space.E, space.y, space.y_a, at.above, at.joints
-    size = 0.0
+    size, worst, wrong = 0.0, 0.0, NO_JOINT
     for k in range(above, at.task):
         size = max(size, abs(y[k] + s * y_a[k]) if k >= begin else abs(y[k]))
     for k in range(at.task - 1, above - 1, -1):  # nu, then mu, take the place of y_a
@@ -386,13 +353,14 @@ def _release(space, at, s):
         for i in range(k + 1, begin):
             pull -= E[i - above, k] * y_a[i]
         y_a[k] = pull / (W[k - begin, k] if k >= begin else E[k - above, k])
-    wrong = False
-    for t in range(begin - above):
-        j = space.joint[t]
-        if y_a[above + t] * space.side[j] < -BOUND_KEPT * size:
-            space.side[j] = 0.0
-            wrong = True
-    return wrong
+    for t in range(begin - above - 1, -1, -1):
+        push = y_a[above + t] * space.side[space.joint[t]]
+        if push < worst - BOUND_KEPT * size:
+            wrong, worst = space.joint[t], push if alone else 0.0
+            space.side[wrong] = space.side[wrong] if alone else 0.0
+    if wrong != NO_JOINT:
+        space.side[wrong] = 0.0
+    return wrong != NO_JOINT
 
 
 @internal
@@ -446,30 +414,23 @@ def _to_reference(space, x, rank):
     while steps < 4 * n + 2:
         steps += 1
         begin = rank + count
-        _free_way(space, x, target, begin)
+        for j in range(n):
+            d[j] = target[j] - x[j]
+        reflect(space.basis, 0, begin, ways, 0, 1)
+        for k in range(begin):  # the step that joints and tasks take from the way to the target
+            space.y[k], d[k] = -d[k], 0.0
+        reflect_back(space.basis, 0, begin, ways, 0, 1)
         stopped = _step(x, d, space)
         if stopped != NO_JOINT:
             space.side[stopped] = 1.0 if d[stopped] > 0.0 else -1.0
             count = _hold(space, no_rows, stopped, x, rank, count)
             if rank + count == begin:
                 break
-        elif release and _drop(space, rank, begin):
+        elif release and _release(space, Columns(rank, begin, begin), 0.0, True):
             count = _hold_again(space, no_rows, x, rank, count)
         else:
             break
     return steps
-
-
-@inlined
-def _free_way(space, x, target, begin):
-    """Write the step from x to the target in columns `begin` and on; the other columns to y."""
-    ways, d = space.line, space.line[0]
-    for j in range(x.size):
-        d[j] = target[j] - x[j]
-    reflect(space.basis, 0, begin, ways, 0, 1)
-    for k in range(begin):
-        space.y[k], d[k] = d[k], 0.0
-    reflect_back(space.basis, 0, begin, ways, 0, 1)
 
 
 @inlined
@@ -491,26 +452,3 @@ def _step(x, d, space):
     if stopped != NO_JOINT:
         x[stopped] = space.up[stopped] if d[stopped] > 0.0 else space.low[stopped]
     return stopped
-
-
-@inlined
-def _drop(space, rank, begin):
-    """Release the held joint that the step to the reference pulls inward most, if there is one.
-
-    y[rank:begin] is that step in the columns of the held joints on entry, multipliers on return.
-    """
-    y, E = space.y, space.E
-    size, worst, at = 0.0, 0.0, NO_JOINT
-    for k in range(rank, begin):
-        size = max(size, abs(y[k]))
-    for k in range(begin - 1, rank - 1, -1):
-        for i in range(k + 1, begin):
-            y[k] -= E[i - rank, k] * y[i]
-        y[k] /= E[k - rank, k]
-        j = space.joint[k - rank]
-        if y[k] * space.side[j] < worst - BOUND_KEPT * size:
-            worst, at = y[k] * space.side[j], j
-    if at == NO_JOINT:
-        return False
-    space.side[at] = 0.0
-    return True

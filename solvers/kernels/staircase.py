@@ -6,7 +6,7 @@ levels are solved from the top by block forward substitution, least squares in e
 recursion (5), (13) in other coordinates. The columns of Q that no level takes carry (14).
 """
 
-from typing import NamedTuple
+from collections import namedtuple
 
 import numpy as np
 
@@ -23,8 +23,6 @@ from solvers.kernels.linalg.rows import (
 )
 from solvers.kernels.linalg.space import (
     Block,
-    Rows,
-    View,
     assign,
     carve_rows,
     fill,
@@ -35,19 +33,12 @@ from solvers.kernels.linalg.space import (
 from solvers.kernels.tolerances import FAR_LIGHTER, LIGHT_ROW, UNCLEAR_CUT, UNCLEAR_PIVOT
 from solvers.status import INACCURATE, NUMERICAL_FAILURE, SOLVED, TOO_SMALL
 
+Staircase = namedtuple("Staircase", "basis rows y of_x of_block")
+"""The rows in coordinates of Q.
 
-class Staircase(NamedTuple):
-    """The rows in coordinates of Q.
-
-    basis: the reflectors of Q. rows: the rows of J Q. y (n,): the answer in the columns of the
-    levels. of_x (1, n): x, for reflections. of_block: work space of `solve_level`.
-    """
-
-    basis: View
-    rows: Rows
-    y: View
-    of_x: View
-    of_block: View
+basis: the reflectors of Q. rows: the rows of J Q. y (n,): the answer in the columns of the
+levels. of_x (1, n): x, for reflections. of_block: work space of `solve_level`.
+"""
 
 
 @inlined
@@ -113,7 +104,12 @@ def climb(A, lower, upper, sizes, x, settings, work):
             rows.miss[i] -= inner_product(y[:above], rows.W[i])  # p_i - J_i x_{i-1}, in (13)
         solve_level(rows.W, rows.miss, y, block, settings, of_block)
         first = last
-    _to_unknowns(basis, y, rank, x, of_x)
+    assign(of_x[0], x)
+    if x.any():
+        reflect(basis, 0, rank, of_x, 0, 1)
+    assign(of_x[0, :rank], y)  # and the rest of the reference: (7) and (14)
+    reflect_back(basis, 0, rank, of_x, 0, 1)
+    assign(x, of_x[0])
     least = 0.0 if has_outlier(rows.zero, FAR_LIGHTER * FAR_LIGHTER) else least
     return finish(x, SOLVED), np.sqrt(least) * settings.rank_tolerance
 
@@ -138,17 +134,3 @@ def smallest_pivot(rows, block, least):
         square, zero = rows.W[i, k] * rows.W[i, k], rows.zero[i]
         least = min(least, square / zero) if zero > 0.0 else least
     return least
-
-
-@inlined
-def _to_unknowns(basis, y, rank, x, of_x):
-    """Replace the reference x by Q [y; rest], with the rest of the reference: (7) and (14)."""
-    zero_reference = True
-    for c in range(x.size):
-        of_x[0, c] = x[c]
-        zero_reference &= x[c] == 0.0
-    if not zero_reference:
-        reflect(basis, 0, rank, of_x, 0, 1)
-    assign(of_x[0, :rank], y)
-    reflect_back(basis, 0, rank, of_x, 0, 1)
-    assign(x, of_x[0])

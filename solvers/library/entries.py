@@ -5,9 +5,9 @@ Addresses are checked as far as they can be, then become arrays. The structs are
 `task_hierarchy.h`; every field of them has 8 bytes.
 """
 
+from collections import namedtuple
 from collections.abc import Callable
 from math import inf
-from typing import NamedTuple
 
 import numpy as np
 
@@ -17,7 +17,7 @@ from solvers.kernels.active_set.exact import keep_staircase, solve, verify_answe
 from solvers.kernels.active_set.exact import work_size as exact_size
 from solvers.kernels.bounds import solve_within_bounds
 from solvers.kernels.linalg.rows import all_equal
-from solvers.kernels.linalg.space import View, fill
+from solvers.kernels.linalg.space import fill
 from solvers.kernels.merged import BY_RULE, OWN, merged, merged_size, write_levels
 from solvers.kernels.merged import record_size as merged_record
 from solvers.kernels.recursion import recursion
@@ -47,51 +47,22 @@ VALUES, SIZE, USED, WARM, ITERATIONS, ROW, RECORD = range(7)
 REALS, COUNTS = 10, 6  # fields of th_settings: numbers, then integers and an address
 LARGEST_TOLERANCE, MOST_ITERATIONS, METHODS, LARGEST_RATIO = 1e-3, 2**31, 4, 1e6
 
-
-class Given(NamedTuple):
-    """The fields of th_settings, in their order."""
-
-    damping: View
-    threshold: View
-    rank_tolerance: View
-    tolerance: View
-    isotropic: View
-    largest: View
-    ratio: View
-    cap: View
-    step: View
-    regularisation: View
-    max_iterations: View
-    optimal: View
-    miss: View
-    method: View
-    strict_levels: View
-    scales: View
-
+Given = namedtuple(
+    "Given", "damping threshold rank_tolerance tolerance isotropic largest ratio cap step"
+    " regularisation max_iterations optimal miss method strict_levels scales")
+"""The fields of th_settings, in their order."""
 
 DEFAULTS = Given(Hcod.damping, Hcod.threshold, Hcod.rank_tolerance, Hcod.tolerance, 0.0, inf,
                  Merged.ratio, Merged.cap, Merged.step, Merged.regularisation, Hcod.max_iterations,
                  0, 0, 0, int(BY_RULE), 0)
 
+Call = namedtuple("Call", "A lower upper sizes reference x values state settings work")
+"""The arrays of a call.
 
-class Call(NamedTuple):
-    """The arrays of a call.
-
-    A (m, n), lower, upper (m,), sizes (L,): see `Hierarchy`. reference (n,), or empty for zero.
-    x (n,). values: the numbers of the record. state (6,) int64: the fields of th_record.
-    settings (6,): those of a kernel, not yet written. work: the rest of the work space.
-    """
-
-    A: View
-    lower: View
-    upper: View
-    sizes: View
-    reference: View
-    x: View
-    values: View
-    state: View
-    settings: View
-    work: View
+A (m, n), lower, upper (m,), sizes (L,): see `Hierarchy`. reference (n,), or empty for zero.
+x (n,). values: the numbers of the record. state (6,) int64: the fields of th_record.
+settings (6,): those of a kernel, not yet written. work: the rest of the work space.
+"""
 
 
 @internal

@@ -13,15 +13,17 @@ from hierarchy.jit import compiled, inlined, inner_product, internal
 from solvers.kernels.active_set.levels import pass_through_levels
 from solvers.kernels.active_set.multipliers import write_multipliers
 from solvers.kernels.active_set.search import pivot_in_blocks, pivot_one_by_one, save
-from solvers.kernels.active_set.tableau import STEPS, carve_tableau, tableau_size
+from solvers.kernels.active_set.tableau import STEPS, carve_tableau
 from solvers.kernels.active_set.verification import neglects, verify
 from solvers.kernels.active_set.working_set import (
     CUT,
     FINISHED,
     FIRST,
+    INDICES,
     LOWER,
     NEGLECTED,
     NORM,
+    NUMBERS,
     REFERENCE,
     SCALE,
     SOUND,
@@ -34,10 +36,9 @@ from solvers.kernels.active_set.working_set import (
     rescale,
     restore,
     take_up,
-    working_set_size,
 )
 from solvers.kernels.active_set.working_set import TOLERANCE as RANK
-from solvers.kernels.damping import carve_damped, damp_level, damped_size, keep_reached, open_damped
+from solvers.kernels.damping import carve_damped, damp_level, keep_reached, open_damped
 from solvers.kernels.linalg.rows import all_equal, finish, length_of
 from solvers.kernels.linalg.space import assign, fill, matrix, vector
 from solvers.kernels.staircase import solve_by_staircase
@@ -68,8 +69,9 @@ DAMPING, RANK_TOLERANCE, TOLERANCE, MOST = 0, 2, 3, 4  # places in the settings 
 @inlined
 def exact_size(n, m, levels):
     """Return the numbers that `open_working_set` and `answer` need."""
-    return ((2 * levels + 2) * m + n + working_set_size(n, m, levels) + tableau_size(n, m)
-            + m * (n + 2))
+    of_set = (NUMBERS + INDICES) * max(m, n, levels + 1) + 16 + 3 * m * n + n * n
+    of_tableau = 16 + n * (m + n) + (m + n) * (n + 3)
+    return (2 * levels + 2) * m + n + of_set + of_tableau + m * (n + 2)
 
 
 @inlined
@@ -77,7 +79,8 @@ def work_size(n, m, levels, damped):
     """Return the numbers that a work space of `solve_hierarchy` needs, with damping or without."""
     if not damped:
         return n + exact_size(n, m, levels)
-    return damped_size(n, m, levels) + 3 * (m + n) + 2 * n + 16 + exact_size(n, m + n, levels)
+    of_damped = (3 * m + n) * (n + 3) + 4 * levels + n + (m + n) * (n + 3) + (m + n) * (n + 1)
+    return of_damped + 3 * (m + n) + 2 * n + 16 + exact_size(n, m + n, levels)
 
 
 @compiled
@@ -183,21 +186,16 @@ def _add_record(record, inner, lower, upper, d, x, end, k):
     """
     m, rows = lower.size, end + (x.size if k < d.factor.size else 0)
     for i in range(end):
-        stays = inner[i] == FREE and _stays(d.A[i], lower[i], upper[i], record[i], x)
-        record[i] = record[i] if stays else inner[i]
+        state, side = record[i], upper[i] if record[i] > 0.0 else lower[i]
+        room = LEVEL_MET * (1.0 + abs(side))  # from x to the side, or beyond it
+        stays = (inner[i] == FREE and abs(state) == 1.0
+                 and state * (side - inner_product(d.A[i], x)) <= room)
+        record[i] = state if stays else inner[i]
         if record[m + i] < 0.0 and 0.0 <= inner[rows + i] <= k:
             record[m + i], record[2 * m + i] = inner[rows + i], inner[2 * rows + i]
     record[3 * m] += inner[3 * rows]
     record[3 * m + 1] += inner[3 * rows + 1]
     record[3 * m + 2] = inner[3 * rows + 2]
-
-
-@inlined
-def _stays(a, low, up, state, x):
-    """Whether x is at the side of a row that is active there by its state, or beyond it."""
-    side = up if state > 0.0 else low
-    return abs(state) == 1.0 and (state * (side - inner_product(a, x))
-                                  <= LEVEL_MET * (1.0 + abs(side)))
 
 
 @inlined
@@ -349,7 +347,6 @@ def _solve_with_light_rows(s, current, saved, limit):
     steps, largest = 0, LARGER * (1.0 + length_of(s.x))
     assign(saved, s.x)
     s.count[FINISHED] = s.multiplier.shape[0]  # nothing else is saved
-    restore(s)
     take_up(s)
     code, tries = pivot_in_blocks(s, limit, PATIENCE)
     if code != SOLVED and tries < limit:
@@ -377,7 +374,6 @@ def verify_answer(A, lower, upper, sizes, x, record, settings, work):
     for reading in range(1 + (s.count[NEGLECTED] > 0) if code == SOLVED else 0):
         if not proved:
             if reading == 1:
-                restore(s)
                 take_up(s)
             meet(s, sizes.size)
             write_multipliers(s)

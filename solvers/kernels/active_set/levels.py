@@ -21,6 +21,7 @@ import numpy as np
 from hierarchy.jit import add_multiple, inlined, internal
 from solvers.kernels.active_set.tableau import (
     BASE,
+    COLUMN,
     FIX,
     FORCE,
     GOAL,
@@ -39,6 +40,7 @@ from solvers.kernels.active_set.tableau import (
     ROW,
     ROWS,
     SCALE,
+    SETTLED,
     SIZE,
     SPEED,
     STEP,
@@ -50,8 +52,7 @@ from solvers.kernels.active_set.tableau import (
     add_column,
     around,
     balance,
-    close_column,
-    fold_to,
+    fold,
     is_independent,
     left_of,
     measure,
@@ -59,21 +60,18 @@ from solvers.kernels.active_set.tableau import (
     open_tableau,
     pivot_rows,
     push_by,
+    reflect_columns,
     step_of_rows,
-    turn_to,
     weigh_rows,
 )
 from solvers.kernels.active_set.working_set import (
     ACTED,
     ENTRY,
-    FACTORED,
     FIRST,
     HOLDS,
     LOWER,
     NORM,
-    PIVOT,
     REFERENCE,
-    SECOND,
     STATE,
     UNIT,
     UPPER,
@@ -82,7 +80,6 @@ from solvers.kernels.active_set.working_set import (
     product_with,
     side_at,
 )
-from solvers.kernels.linalg.rows import length_of
 from solvers.kernels.linalg.space import assign, fill
 from solvers.kernels.tolerances import CANCELLED, FLOOR, REPIVOT
 from solvers.status import EQUAL, FREE, SOLVED, UNPROVED
@@ -102,15 +99,16 @@ def pass_through_levels(t, tolerance, limit, seeded):
     """
     s = t.of
     levels = s.multiplier.shape[0] - 1
-    _start(t, seeded)
+    open_tableau(t, seeded)
     for k in range(levels + 1):
         first = s.index[FIRST, k]
         last = s.index[FIRST, k + 1] if k < levels else first
         whole = _sets_goal(t, k)
         if seeded:
             _hold_seeded(t, k, first, tolerance)
-        solved = not _begin(t, k, last, whole, tolerance)
-        while not solved:
+        begun = _begin(t, k, last, whole, tolerance)
+        missed = not whole and s.multiplier[k, first:last].any()
+        while begun:
             if t.count[STEPS] >= limit:
                 return UNPROVED, k
             t.count[STEPS] += 1
@@ -122,11 +120,18 @@ def pass_through_levels(t, tolerance, limit, seeded):
             elif leaving >= 0:
                 _leave(t, leaving, last, tolerance)
             else:
-                solved = True
-                _settle(t, k, whole)
-                _order(t, whole)
+                _settle(t, k)
+                missed = missed or t.count[MISSED] == 1
+                break
+        if missed:
+            _write_multipliers(t, k, whole)
+        if begun:
+            _order(t, whole)
+        _close_columns(t)
         if whole and k < levels:
             s.count[WHOLE] = k
+            for i in range(first, last):
+                s.multiplier[k, i] = s.number[ENTRY, i] * s.x[s.index[UNIT, i]] - side_at(s, i)
             break
     return SOLVED, -1
 
@@ -144,25 +149,6 @@ def _hold_seeded(t, k, end, tolerance):
             _enter(t, i, end)
         else:
             s.index[STATE, i] = FREE
-
-
-@inlined
-def _start(t, seeded):
-    """Start at x and the rows that act, or at x = 0 with an empty working set."""
-    s = t.of
-    s.count[WHOLE], s.count[FACTORED], s.scalar[PIVOT], s.scalar[SECOND] = -1, 0, 1.0, 1.0
-    for i in range(s.A.shape[0]):
-        s.index[KIND, i], s.number[VALUE, i] = 0, 0.0
-        s.index[ACTED, i] = s.index[STATE, i]
-        if s.index[STATE, i] != EQUAL:
-            s.index[STATE, i] = FREE
-    if not seeded:
-        fill(s.x, 0.0)
-    fill(t.count, 0)
-    fill(t.scalar, 0.0)
-    for p in range(s.multiplier.shape[0]):
-        fill(s.multiplier[p], 0.0)
-    open_tableau(t)
 
 
 @inlined
@@ -186,7 +172,7 @@ def _begin(t, k, last, whole, tolerance):
     A row with no remainder outside the fixed rows is settled.
     """
     s, count, n = t.of, t.count, t.of.x.size
-    measure(t, length_of(s.x))
+    measure(t)
     count[RANKS] = count[ROWS] = 0
     for i in range(s.index[FIRST, k] if k < s.multiplier.shape[0] - 1 else last, last):
         value = product_with(s, i, s.x)
@@ -207,10 +193,6 @@ def _begin(t, k, last, whole, tolerance):
         else:
             s.multiplier[k, i] = value - side_at(s, i)
     _watch_parallel(t, last)
-    if count[ROWS] == 0 and not whole:
-        if _has_misses(s, k):
-            _write_multipliers(t, k, whole)
-        _close_columns(t)
     return count[ROWS] > 0 or whole
 
 
@@ -263,7 +245,10 @@ def _aim(t, whole):
     """Write the step of a level from the current x, in basis vectors; return their number."""
     s, begin = t.of, t.count[FIX] + t.count[HARD]
     if whole:
-        _head_for_goal(t, begin)
+        t.scalar[REACH] = 0.0
+        for r in range(begin, s.x.size):
+            s.number[Z, r] = step = _way_to_goal(t, r)
+            t.scalar[SIZE] = max(t.scalar[SIZE], abs(step))
         return s.x.size - begin
     t.count[RANKS] = pivot_rows(t, begin, t.count[RANKS])
     for q in range(t.count[ROWS]):
@@ -276,19 +261,21 @@ def _aim(t, whole):
 
 
 @inlined
-def _head_for_goal(t, begin):
-    """Write the step towards the goal, in basis vectors."""
-    t.scalar[REACH] = 0.0
-    for r in range(begin, t.of.x.size):
-        t.of.number[Z, r] = step = _way_to_goal(t, r)
-        t.scalar[SIZE] = max(t.scalar[SIZE], abs(step))
-
-
-@inlined
 def _advance(t, rank, last, tolerance):
     """Move along the step up to the first watched row; return it, or -1 if there is none."""
     s, x, p, value, speed = t.of, t.of.x, t.of.number[STEP], t.of.number[VALUE], t.of.number[SPEED]
-    scale, entering, side, length = _write_step(t, rank), -1, 0, 1.0
+    begin, size, square = t.count[FIX] + t.count[HARD], t.scalar[REACH], 0.0
+    entering, side, length = -1, 0, 1.0
+    fill(p[:x.size], 0.0)
+    for r in range(begin, begin + rank):
+        size = max(size, abs(s.number[Z, r]))
+        add_multiple(p[:x.size], s.number[Z, r], t.M[r, t.count[BASE]:])
+    for c in range(x.size):
+        square += (x[c] + p[c]) ** 2
+    # A step of a level that is nearly singular is long, and cut short by the first row in its way:
+    # so its end sets no tolerance before it is reached.
+    t.scalar[REACH] = size = max(size, np.sqrt(square))
+    scale = max(t.scalar[SCALE], np.sqrt(square), FLOOR * max(size, t.scalar[SIZE]))
     for i in range(last):
         if s.index[KIND, i] != WATCHED:
             continue
@@ -313,25 +300,6 @@ def _advance(t, rank, last, tolerance):
 
 
 @inlined
-def _write_step(t, rank):
-    """Write the step in x, given the step in basis vectors; return the scale at its end.
-
-    A step of a level that is nearly singular is long, and cut short by the first row in its way: so
-    its end sets no tolerance before it is reached.
-    """
-    x, p, z, size, square = t.of.x, t.of.number[STEP], t.of.number[Z], t.scalar[REACH], 0.0
-    begin, base = t.count[FIX] + t.count[HARD], t.count[BASE]
-    fill(p[:x.size], 0.0)
-    for r in range(begin, begin + rank):
-        size = max(size, abs(z[r]))
-        add_multiple(p[:x.size], z[r], t.M[r, base:])
-    for c in range(x.size):
-        square += (x[c] + p[c]) ** 2
-    t.scalar[REACH] = size = max(size, np.sqrt(square))
-    return max(t.scalar[SCALE], np.sqrt(square), FLOOR * max(size, t.scalar[SIZE]))
-
-
-@inlined
 def _enter(t, i, first):
     """Add row i to the working set, as a soft row of the level or as a held row."""
     s, count, n = t.of, t.count, t.of.x.size
@@ -346,9 +314,9 @@ def _enter(t, i, first):
         s.index[KIND, i], s.index[STATE, i] = PARALLEL, FREE
         return
     free = min(begin + count[RANKS], n - 1)
-    turn_to(t, free, n, i)
+    reflect_columns(t.M, free, n, s.index[COLUMN, i], count[TURNING], t.room)
     for r in range(free - 1, begin - 1, -1):
-        fold_to(t, r, i)
+        fold(t.M, r, s.index[COLUMN, i], count[TURNING])
     s.index[OWNER, begin], s.index[KIND, i] = i, HELD
     count[HARD] += 1
     count[RANKS] = min(count[RANKS], n - begin - 1)
@@ -363,7 +331,7 @@ def _enter(t, i, first):
 def _held_wrongly(t, whole, tolerance):
     """Write the forces of the held rows; return the row whose force is wrong the most, or -1."""
     s, begin, end = t.of, t.count[FIX], t.count[FIX] + t.count[HARD]
-    measure(t, length_of(s.x))
+    measure(t)
     fill(s.number[PULL, begin:end], 0.0)
     fill(s.number[FORCE, begin:end], 0.0)
     t.count[MISSED] = _misses_goal(t, tolerance) if whole else not weigh_rows(t) <= tolerance
@@ -418,48 +386,42 @@ def _leave(t, i, last, tolerance):
         s.index[STATE, i] = side
         if side == -was:
             return
-        _drop(t, i)
-    else:
-        _release(t, i)
+    _remove(t, i)
     s.index[STATE, i], s.index[KIND, i] = FREE, WATCHED
     _watch_parallel(t, last)
 
 
 @inlined
-def _release(t, i):
-    """Release the held row i: its basis vector goes to the soft rows."""
-    s, count, owner, place = t.of, t.count, t.of.index[OWNER], t.count[FIX]
-    while owner[place] != i:
-        place += 1
-    count[HARD] -= 1
-    end = count[FIX] + count[HARD]
-    for r in range(place, end):
-        owner[r] = owner[r + 1]
-        fold_to(t, r, owner[r])
-    for q in range(count[RANKS]):
-        fold_to(t, end + q, s.index[LIST, q])
+def _remove(t, i):
+    """Remove row i from the held rows, or the soft ones; its basis vector goes behind the soft."""
+    s, count, owner, soft = t.of, t.count, t.of.index[OWNER], t.of.index[LIST]
+    held = s.index[KIND, i] == HELD
+    place, begin = 0, count[FIX] + count[HARD] - held
+    if held:
+        place = count[FIX]
+        while owner[place] != i:
+            place += 1
+        for r in range(place, begin):
+            owner[r] = owner[r + 1]
+        count[HARD] -= 1
+    else:
+        while soft[place] != i:
+            place += 1
+        count[ROWS] -= 1
+        if place >= count[RANKS]:
+            soft[place] = soft[count[ROWS]]
+            return
+        for q in range(place, count[ROWS]):
+            soft[q] = soft[q + 1]
+        count[RANKS] -= 1
+        place += begin
+    for r in range(place, begin + count[RANKS]):
+        row = owner[r] if r < begin else soft[r - begin]
+        fold(t.M, r, s.index[COLUMN, row], count[TURNING])
 
 
 @inlined
-def _drop(t, i):
-    """Remove row i from the soft rows."""
-    count, soft, place = t.count, t.of.index[LIST], 0
-    while soft[place] != i:
-        place += 1
-    count[ROWS] -= 1
-    if place >= count[RANKS]:
-        soft[place] = soft[count[ROWS]]
-        return
-    for q in range(place, count[ROWS]):
-        soft[q] = soft[q + 1]
-    count[RANKS] -= 1
-    begin = count[FIX] + count[HARD]
-    for q in range(place, count[RANKS]):
-        fold_to(t, begin + q, soft[q])
-
-
-@inlined
-def _settle(t, k, whole):
+def _settle(t, k):
     """Turn the rows that a level decided into permanent equalities; its other rows stay held."""
     s, count, number, kind = t.of, t.count, t.of.number, t.of.index[KIND]
     fixed, end = count[FIX], count[FIX] + count[HARD]
@@ -468,7 +430,6 @@ def _settle(t, k, whole):
         i = s.index[OWNER, r]
         if missed and s.index[STATE, i] * number[FORCE, r] > 0.0:
             kind[i] = FIXED
-    missed_before = not whole and _has_misses(s, k)
     for q in range(count[ROWS]):
         i, over = s.index[LIST, q], number[OVER, q]
         kind[i], s.multiplier[k, i] = FIXED, over if missed else 0.0
@@ -476,17 +437,6 @@ def _settle(t, k, whole):
             is_independent(t, i, left_of(t, i, end + count[RANKS], s.x.size))
         if s.index[STATE, i] != EQUAL and not s.index[STATE, i] * s.multiplier[k, i] > 0.0:
             kind[i], s.multiplier[k, i] = HELD, 0.0
-    if missed or missed_before:
-        _write_multipliers(t, k, whole)
-    if whole and k < s.multiplier.shape[0] - 1:
-        for i in range(s.index[FIRST, k], s.index[FIRST, k + 1]):
-            s.multiplier[k, i] = s.number[ENTRY, i] * s.x[s.index[UNIT, i]] - side_at(s, i)
-
-
-@inlined
-def _has_misses(s, k):
-    """Whether rows of level k are missed that were settled before its first step."""
-    return s.multiplier[k, s.index[FIRST, k]:s.index[FIRST, k + 1]].any()
 
 
 @inlined
@@ -515,16 +465,29 @@ def _order(t, whole):
                 kind[i], s.index[STATE, i] = WATCHED, FREE
                 s.number[VALUE, i] = product_with(s, i, s.x)
     count[HARD] = at - count[FIX]
-    _close_columns(t)
 
 
 @inlined
 def _close_columns(t):
-    """Settle the columns of the fixed rows, and close those of rows that no longer act."""
-    for at in range(t.count[TURNING], t.count[BASE]):
-        kind = t.of.index[KIND, t.of.index[ROW, at]]
-        if kind in (WATCHED, FIXED, PARALLEL):
-            close_column(t, at, kind == FIXED)
+    """Settle the columns of the fixed rows, and close those of rows that no longer act.
+
+    The first that turns fills the place.
+    """
+    s, M, count = t.of, t.M, t.count
+    for at in range(count[TURNING], count[BASE]):
+        i, first, to = s.index[ROW, at], count[TURNING], count[SETTLED]
+        other, settled = s.index[ROW, first], s.index[KIND, i] == FIXED
+        if not settled and s.index[KIND, i] not in (WATCHED, PARALLEL):
+            continue
+        for r in range(s.x.size):
+            entry = M[r, at]
+            M[r, at] = M[r, first]
+            if settled:
+                M[r, to] = entry
+        s.index[COLUMN, other], s.index[ROW, at] = at, other
+        s.index[COLUMN, i] = to if settled else -1
+        count[TURNING] += 1
+        count[SETTLED] += settled
 
 
 @inlined
@@ -532,7 +495,7 @@ def _own(t, i, at, end):
     """Give row i the basis vector `at` if it is independent of those before; return the next."""
     s, left = t.of, left_of(t, i, at, end)
     if at < end and is_independent(t, i, left):
-        turn_to(t, at, end, i)
+        reflect_columns(t.M, at, end, s.index[COLUMN, i], t.count[TURNING], t.room)
         s.index[OWNER, at] = i
         return at + 1
     return at

@@ -180,7 +180,12 @@ def _write_forces(s, last):
         if end - begin > s.index[RANK, k + 1] - s.index[RANK, k]:
             _share(s, begin, end, s.index[RANK, k], s.index[RANK, k + 1])
         else:
-            _substitute(s, begin, end, s.index[RANK, k])
+            for q in range(end - 1, begin - 1, -1):
+                t = s.index[RANK, k] + q - begin
+                pull, enough = s.number[GRADIENT, t], s.number[NOISE, t]
+                s.number[FORCE, q] = force = -pull / s.W[q, t] if abs(pull) > enough else 0.0
+                if force != 0.0:
+                    _add(s, force, 0.0, q, s.index[RANK, k], t)
         if s.index[RANK, k] > 0:
             _add_rows(s, k, 0.0, 0.0, 0.0)
 
@@ -195,17 +200,6 @@ def _balance(s, p):
             s.multiplier[p, i] = force
             if s.index[SIGN, q] == UNDECIDED:
                 s.index[SIGN, q] = OUTWARD if force * s.index[STATE, i] > 0.0 else INWARD
-
-
-@inlined
-def _substitute(s, begin, end, above):
-    """Write the forces of a level of independent rows."""
-    for q in range(end - 1, begin - 1, -1):
-        t = above + q - begin
-        pull = s.number[GRADIENT, t]
-        s.number[FORCE, q] = force = -pull / s.W[q, t] if abs(pull) > s.number[NOISE, t] else 0.0
-        if force != 0.0:
-            _add(s, force, 0.0, q, above, t)
 
 
 @inlined

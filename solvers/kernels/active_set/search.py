@@ -97,14 +97,6 @@ def _points_inward(s):
     return inward
 
 
-@inlined
-def _heed(s):
-    """Let the multipliers whose sign verification refutes point inward."""
-    for q in range(s.index[BEGIN, s.multiplier.shape[0] - 1]):
-        if s.index[CHANGE, s.index[LIST, q]] == REFUTED:
-            s.index[SIGN, q] = INWARD
-
-
 @internal
 def pivot_in_blocks(s, limit, patience):
     """Change all wrong rows at once while their number falls; return the code and the tries.
@@ -124,7 +116,9 @@ def pivot_in_blocks(s, limit, patience):
         if not _points_inward(s):
             if verify(s, True):
                 return SOLVED, tries
-            _heed(s)
+            for q in range(s.index[BEGIN, levels]):
+                if s.index[CHANGE, s.index[LIST, q]] == REFUTED:
+                    s.index[SIGN, q] = INWARD
         wrong, leaving, _ = judge(s, levels, -1)
         if wrong == 0:
             s.count[SOUND] = 0  # x is no longer that of an earlier set
@@ -135,10 +129,7 @@ def pivot_in_blocks(s, limit, patience):
         best = min(best, wrong)
         if left < 0:
             break
-        for i in range(s.A.shape[0]):
-            change = s.index[CHANGE, i]
-            if change != 0:
-                s.index[STATE, i] = FREE if change == LEAVES else change
+        _change(s, wrong, False)
     assign(s.index[STATE], s.index[SEED])
     if s.count[SOUND] == 1:
         assign(s.x, s.number[KEPT])
@@ -191,9 +182,9 @@ def pivot_one_by_one(s, current, saved, limit, level):
         if wrong > 0:
             _drop_rounding(s)
         if wrong > 0 and slices >= SLICED:
-            _change_first(s)
+            _change(s, 1, False)
         elif leaving > 0 and fresh:
-            _release_all(s)
+            _change(s, leaving, True)
         elif leaving > 0:
             _release_first(s, current)
         elif most >= 0:
@@ -261,20 +252,13 @@ def _drop_rounding(s):
 
 
 @inlined
-def _change_first(s):
-    """Change the first row that is wrong."""
-    i = 0
-    while s.index[CHANGE, i] == 0:
-        i += 1
-    s.index[STATE, i] = FREE if s.index[CHANGE, i] == LEAVES else s.index[CHANGE, i]
-
-
-@inlined
-def _release_all(s):
-    """Release all rows whose multipliers point inward."""
+def _change(s, count, leave):
+    """Change the first rows that are wrong, so many of them; `leave`: of those that are to."""
     for i in range(s.A.shape[0]):
-        if s.index[CHANGE, i] == LEAVES:
-            s.index[STATE, i] = FREE
+        change = s.index[CHANGE, i]
+        if count > 0 and change != 0 and (change == LEAVES or not leave):
+            s.index[STATE, i] = FREE if change == LEAVES else change
+            count -= 1
 
 
 @inlined

@@ -12,30 +12,35 @@ Saunders 1974), never a new factorisation. The columns of a row depend on that r
 very different norm do not disturb each other.
 """
 
-from typing import NamedTuple
+from collections import namedtuple
 
 import numpy as np
 
 from hierarchy.jit import add_multiple, as_matrix, inlined, inner_product, internal
 from solvers.kernels.active_set.working_set import (
+    ACTED,
     CUT,
     ENTRY,
+    FACTORED,
     FIRST,
     LOWER,
     NORM,
+    PIVOT,
     REFERENCE,
+    SECOND,
     STATE,
     TOLERANCE,
     UNIT,
     UPPER,
+    WHOLE,
     note_pivot,
     side_at,
 )
 from solvers.kernels.linalg.least_squares import least_squares
-from solvers.kernels.linalg.rows import swap
-from solvers.kernels.linalg.space import View, assign, fill, integers, matrix, vector
+from solvers.kernels.linalg.rows import length_of, swap
+from solvers.kernels.linalg.space import assign, fill, integers, matrix, vector
 from solvers.kernels.tolerances import CANCELLED, CLEAR_SQUARE, EPSILON, FAINT, FLOOR, NEGLIGIBLE
-from solvers.status import EQUAL
+from solvers.status import EQUAL, FREE
 
 # Rows of `number` after those of the data. Per row of A: its value and the rate of that; its
 # residual before the step of its level and its excess after (in the order of the list). Per unknown
@@ -54,25 +59,12 @@ SETTLED, TURNING, BASE, FIX, HARD, RANKS, ROWS, MISSED, STEPS = range(9)
 # what of the sum of its rows' pulls may be rounding; the largest number of a whole step.
 SIZE, SCALE, WEIGHT, ROUNDING, REACH = range(5)
 
+Tableau = namedtuple("Tableau", "of count scalar M room")
+"""The data of a solve level by level.
 
-class Tableau(NamedTuple):
-    """The data of a solve level by level.
-
-    of: the WorkingSet whose data it shares. count, scalar: see above. M (n, g + n), g the number of
-    rows with more than one entry. room: scratch.
-    """
-
-    of: View
-    count: View
-    scalar: View
-    M: View
-    room: View
-
-
-@inlined
-def tableau_size(n, m):
-    """Return the numbers that a Tableau needs: M, and the least squares of all rows."""
-    return 16 + n * (m + n) + (m + n) * (n + 3)
+of: the WorkingSet whose data it shares. count, scalar: see above. M (n, g + n), g the number of
+rows with more than one entry. room: scratch.
+"""
 
 
 @inlined
@@ -89,16 +81,29 @@ def carve_tableau(s, work):
 
 
 @internal
-def open_tableau(t):
-    """Write M for Q = I, with the columns of the equalities."""
+def open_tableau(t, seeded):
+    """Start at x and the rows that act, or at x = 0 with an empty working set, with Q = I.
+
+    Equalities have their columns of M.
+    """
     s, M, base = t.of, t.M, t.M.shape[1] - t.of.x.size
-    at = base
+    s.count[WHOLE], s.count[FACTORED], s.scalar[PIVOT], s.scalar[SECOND] = -1, 0, 1.0, 1.0
+    if not seeded:
+        fill(s.x, 0.0)
+    fill(t.count, 0)
+    fill(t.scalar, 0.0)
+    for p in range(s.multiplier.shape[0]):
+        fill(s.multiplier[p], 0.0)
     for r in range(s.x.size):
         fill(M[r, base:], 0.0)
         M[r, base + r] = 1.0
+    at = base
     for i in range(s.A.shape[0]):
-        s.index[COLUMN, i] = base + s.index[UNIT, i] if s.index[UNIT, i] >= 0 else -1
-        if s.index[COLUMN, i] < 0 and s.index[STATE, i] == EQUAL:
+        s.index[KIND, i], s.number[VALUE, i], unit = 0, 0.0, s.index[UNIT, i]
+        s.index[ACTED, i], s.index[COLUMN, i] = s.index[STATE, i], base + unit if unit >= 0 else -1
+        if s.index[STATE, i] != EQUAL:
+            s.index[STATE, i] = FREE
+        elif unit < 0:
             at -= 1
             s.index[COLUMN, i], s.index[ROW, at] = at, i
             assign(M[:, at], s.A[i])
@@ -113,34 +118,6 @@ def add_column(t, i):
         s.index[COLUMN, i], s.index[ROW, at], t.count[TURNING] = at, i, at
         for r in range(s.x.size):
             t.M[r, at] = inner_product(s.A[i], t.M[r, t.count[BASE]:])
-
-
-@inlined
-def close_column(t, at, settled):
-    """Take a column from those that turn, to the settled or away; the first fills its place."""
-    s, M, first, to = t.of, t.M, t.count[TURNING], t.count[SETTLED]
-    i, other = s.index[ROW, at], s.index[ROW, first]
-    for r in range(s.x.size):
-        entry = M[r, at]
-        M[r, at] = M[r, first]
-        if settled:
-            M[r, to] = entry
-    s.index[COLUMN, other], s.index[ROW, at] = at, other
-    s.index[COLUMN, i] = to if settled else -1
-    t.count[TURNING] += 1
-    t.count[SETTLED] += settled
-
-
-@inlined
-def turn_to(t, k, end, i):
-    """Reflect basis vectors k .. end - 1 so that row i has nothing in them beyond the first."""
-    reflect_columns(t.M, k, end, t.of.index[COLUMN, i], t.count[TURNING], t.room)
-
-
-@inlined
-def fold_to(t, k, i):
-    """Rotate basis vectors k and k + 1 so that row i has nothing in the second."""
-    fold(t.M, k, t.of.index[COLUMN, i], t.count[TURNING])
 
 
 @internal
@@ -239,7 +216,8 @@ def pivot_rows(t, begin, rank):
         swap(rows, rank, best)
         swap(left, rank, best)
         is_independent(t, rows[rank], largest)
-        turn_to(t, begin + rank, n, rows[rank])
+        column = s.index[COLUMN, rows[rank]]
+        reflect_columns(t.M, begin + rank, n, column, t.count[TURNING], t.room)
         rank += 1
         for q in range(rank, count):
             left[q] -= (entry_of(t, rows[q]) * t.M[begin + rank - 1, s.index[COLUMN, rows[q]]]) ** 2
@@ -266,8 +244,9 @@ def missed_side(s, i, value, scale, tolerance):
 
 
 @inlined
-def measure(t, length):
+def measure(t):
     """Write the scale of tolerances: the length of x, but at least the size of rounding."""
+    length = length_of(t.of.x)
     t.scalar[SIZE] = max(t.scalar[SIZE], length)
     t.scalar[SCALE] = max(length, FLOOR * t.scalar[SIZE])
 
@@ -278,38 +257,28 @@ def step_of_rows(t, begin, rank):
 
     Independent rows are met. Returns the size of the largest numbers involved.
     """
-    if t.count[ROWS] > rank:
-        return _least_squares_step(t, begin, rank)
-    s, size, y = t.of, 0.0, t.of.number[Z, begin:]
-    for q in range(rank):
-        i, left = s.index[LIST, q], s.number[REST, q]
-        column, entry = s.index[COLUMN, i], entry_of(t, i)
-        diagonal = entry * t.M[begin + q, column]
-        size = max(size, abs(left / diagonal))
-        for c in range(q):
-            left -= entry * t.M[begin + c, column] * y[c]
-        y[q] = left / diagonal
-        s.number[OVER, q] = 0.0
-    return size
-
-
-@inlined
-def _least_squares_step(t, begin, rank):
-    """Like `step_of_rows`, for more rows than rank."""
     s, rows, size, y = t.of, t.count[ROWS], 0.0, t.of.number[Z, begin:]
     L = as_matrix(t.room[:rows * (rank + 1)], rank + 1, rows)
     for q in range(rows):
         i, rest = s.index[LIST, q], s.number[REST, q]
         column, entry, least = s.index[COLUMN, i], entry_of(t, i), s.scalar[TOLERANCE]
+        if rows == rank:
+            diagonal = entry * t.M[begin + q, column]
+            size = max(size, abs(rest / diagonal))
+            for c in range(q):
+                rest -= entry * t.M[begin + c, column] * y[c]
+            y[q], s.number[OVER, q] = rest / diagonal, 0.0
+            continue
         seen = left_of(t, i, begin, begin + rank) > (least * s.number[NORM, i]) ** 2
         for c in range(rank):  # entries of a row in the span of the rows above are rounding
             L[c, q] = entry * t.M[begin + c, column] if c <= q and seen else 0.0
         L[rank, q] = rest
         if q < rank:
             size = max(size, abs(rest / L[q, q]))
-    least_squares(L[:rank], L[rank], y)
-    for q in range(rows):
-        s.number[OVER, q] = -L[rank, q]
+    if rows > rank:
+        least_squares(L[:rank], L[rank], y)
+        for q in range(rows):
+            s.number[OVER, q] = -L[rank, q]
     return size
 
 

@@ -20,7 +20,7 @@ sign may hang on the difference, and no row be off its side by more than roundin
 the large multipliers say by how far that moves x.
 """
 
-from typing import NamedTuple
+from collections import namedtuple
 
 import numpy as np
 
@@ -122,7 +122,9 @@ def _rows_hold(s, reach):
         cut = max(cut, s.number[CUT, i] / norm)
         if s.index[STATE, i] in (EQUAL, FREE):
             s.index[CHANGE, i] = DECIDED
-    return _ranks_are_clear(s, cut)
+    # No row would be dependent or not by an angle near the tolerance.
+    return (RANK_MARGIN * cut <= s.scalar[TOLERANCE] <= s.scalar[PIVOT] / RANK_MARGIN
+            and s.scalar[PIVOT] * s.scalar[SECOND] >= PIVOT_PRODUCT)
 
 
 @inlined
@@ -138,29 +140,13 @@ def _row_holds(s, k, i, reach):
     return beyond <= shift * reach + EPSILON * terms
 
 
-@inlined
-def _ranks_are_clear(s, cut):
-    """Whether no row would be dependent or not by an angle near the tolerance."""
-    return (RANK_MARGIN * cut <= s.scalar[TOLERANCE] <= s.scalar[PIVOT] / RANK_MARGIN
-            and s.scalar[PIVOT] * s.scalar[SECOND] >= PIVOT_PRODUCT)
+Level = namedtuple("Level", "p begin end least far missed source unsure")
+"""A level p to verify: its rows, and what they have in common.
 
-
-class Level(NamedTuple):
-    """A level p to verify: its rows, and what they have in common.
-
-    least: the norm of the lightest row that acts. far: the largest violation. missed: the length of
-    all, each over the norm of its row. source: the largest violation times the norm of its row.
-    unsure: what rounding of the largest may be in the force of the heaviest row.
-    """
-
-    p: int
-    begin: int
-    end: int
-    least: float
-    far: float
-    missed: float
-    source: float
-    unsure: float
+least: the norm of the lightest row that acts. far: the largest violation. missed: the length of
+all, each over the norm of its row. source: the largest violation times the norm of its row.
+unsure: what rounding of the largest may be in the force of the heaviest row.
+"""
 
 
 @inlined

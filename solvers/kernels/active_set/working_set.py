@@ -11,14 +11,14 @@ is cut from it, and stays so for the rest of the solve: so all working sets belo
 within `rank_tolerance` of each row.
 """
 
-from typing import NamedTuple
+from collections import namedtuple
 
 import numpy as np
 
 from hierarchy.jit import as_matrix, inlined, inner_product, internal
 from solvers.kernels.linalg.least_squares import substitute_back, triangularise, turn
 from solvers.kernels.linalg.rows import factor_level, only_entry, reflect, reflect_back, swap
-from solvers.kernels.linalg.space import Rows, View, assign, fill, integers, matrix, vector
+from solvers.kernels.linalg.space import Rows, assign, fill, integers, matrix, vector
 from solvers.kernels.tolerances import CANCELLED, LEAST_SQUARE, NEGLIGIBLE, SPARED
 from solvers.status import EQUAL, FREE, NUMERICAL_FAILURE, SOLVED, UNPROVED
 
@@ -51,34 +51,15 @@ PICKED, WHOLE, DIRTY, NEGLECTED, FINISHED, SEEN_LAST, FACTORED, SOUND = range(8)
 TOLERANCE, SIZE, PIVOT, SECOND, SCALE = range(5)
 _LARGEST = 2.0**1023  # power of two
 
+WorkingSet = namedtuple("WorkingSet", "A x number index count scalar multiplier W basis T C")
+"""The data of a solve.
 
-class WorkingSet(NamedTuple):
-    """The data of a solve.
-
-    A (m, n), x (n,). number, index (.., w), w the largest of m, n, L + 1; count, scalar: see above.
-    multiplier (L + 1, m): of each row in each level, and in its own level its violation
-    a x - side. W (m, n): the listed rows in coordinates of Q. basis: the reflectors of Q. T (n m,):
-    the columns of each level with more rows than rank, from m times its first column on. C (m, n):
-    the rows that were cut.
-    """
-
-    A: View
-    x: View
-    number: View
-    index: View
-    count: View
-    scalar: View
-    multiplier: View
-    W: View
-    basis: View
-    T: View
-    C: View
-
-
-@inlined
-def working_set_size(n, m, levels):
-    """Return the numbers that a WorkingSet needs, without its multipliers."""
-    return (NUMBERS + INDICES) * max(m, n, levels + 1) + 16 + 3 * m * n + n * n
+A (m, n), x (n,). number, index (.., w), w the largest of m, n, L + 1; count, scalar: see above.
+multiplier (L + 1, m): of each row in each level, and in its own level its violation
+a x - side. W (m, n): the listed rows in coordinates of Q. basis: the reflectors of Q. T (n m,):
+the columns of each level with more rows than rank, from m times its first column on. C (m, n):
+the rows that were cut.
+"""
 
 
 @inlined
@@ -216,7 +197,8 @@ def restore(s):
 
 @internal
 def take_up(s):
-    """Give the rows that are negligible beside those of other levels their norms."""
+    """Give all rows back what was cut, and those negligible beside other levels their norms."""
+    restore(s)
     s.count[NEGLECTED] = s.count[FACTORED] = 0
     for i in range(s.A.shape[0]):
         s.number[NORM, i] = abs(s.number[NORM, i])
@@ -265,7 +247,9 @@ def meet(s, last):
                 index[LIST, rows] = i
                 rows += 1
         if rows > begin:
-            index[SHORT, k] = _is_short(s, begin, rows, rank)
+            left = s.x.size - rank  # columns, where so few are left that they cost less than rows
+            few = rank > s.count[PICKED] and 2 * left < s.x.size
+            index[SHORT, k] = few and left + SPARED < rows - begin
             above, rank = rank, _factor(s, begin, rows, rank, index[SHORT, k] == 1)
             _solve(s, begin, rows, above, rank, index[SHORT, k] == 1)
     _note_factors(s, levels, rows, rank)
@@ -320,14 +304,6 @@ def gives_all(s, k, goal, seen):
         seen[c] = 1.0
         goal[c] = s.number[LOWER, i] / s.number[ENTRY, i]
     return True
-
-
-@inlined
-def _is_short(s, begin, end, rank):
-    """Whether a level has so few columns left that these cost less than its rows."""
-    left = s.x.size - rank
-    few = rank > s.count[PICKED]
-    return few and 2 * left < s.x.size and left + SPARED < end - begin
 
 
 @inlined
@@ -464,7 +440,11 @@ def _solve(s, begin, end, above, rank, short):
                 rest -= s.W[begin + t - above, c] * y[c]
             y[t], miss[begin + t - above] = rest / s.W[begin + t - above, t], 0.0
     elif rank > above:
-        T, _ = _triangle(s, begin, end, above, rank)
+        T, _ = matrix(s.T, above * s.W.shape[0], rank - above, end - begin)
+        for k in range(T.shape[0]):
+            for i in range(T.shape[1]):
+                T[k, i] = s.W[begin + i, above + k] if k <= i else 0.0
+        triangularise(T, s.number[DIAGONAL, above:])
         s.scalar[SIZE] = max(s.scalar[SIZE], most / norm)  # sides may cancel to their rounding
         turn(T, miss[begin:], False)
         for t in range(above, rank):
@@ -478,27 +458,14 @@ def _solve(s, begin, end, above, rank, short):
 
 
 @inlined
-def _triangle(s, begin, end, above, rank):
-    """Make the columns of a level upper triangular; return them and where they end."""
-    T, at = matrix(s.T, above * s.W.shape[0], rank - above, end - begin)
-    for k in range(T.shape[0]):
-        for i in range(T.shape[1]):
-            T[k, i] = s.W[begin + i, above + k] if k <= i else 0.0
-    triangularise(T, s.number[DIAGONAL, above:])
-    return T, at
-
-
-@inlined
 def _keep_goal(s, rank):
     """Give y in the columns from `rank` on the goal."""
-    n, picked, order, moved, goal = s.x.size, s.count[PICKED], s.index[ORDER], False, s.number[GOAL]
-    for c in range(n):
-        s.number[SCRATCH, c] = goal[c]
-        moved |= goal[c] != 0.0
-    if moved:
+    n, goal, old = s.x.size, s.number[GOAL], s.number[SCRATCH]
+    if goal[:n].any():
+        assign(old[:n], goal)
         for t in range(n):
-            goal[t] = s.number[SCRATCH, order[t]]
-        reflect(s.basis, picked, rank, s.number, GOAL, GOAL + 1)
+            goal[t] = old[s.index[ORDER, t]]
+        reflect(s.basis, s.count[PICKED], rank, s.number, GOAL, GOAL + 1)
     assign(s.number[Y, rank:n], goal[rank:])
 
 

@@ -25,21 +25,26 @@ def solve_level(M, r, y, at, settings, work):
 @internal
 def solve_damped_level(M, r, y, at, damped, work):
     """Like `solve_level`, for a given lambda."""
-    rank = at.k1 - at.k0
-    if damped == 0.0 and at.i1 - at.i0 == rank:
-        _substitute(M, r, y, at)
+    rank, rows = at.k1 - at.k0, at.i1 - at.i0
+    if damped == 0.0 and rows == rank:
+        for k in range(at.k0, at.k1):
+            i = at.i0 + k - at.k0
+            y[k] = (r[i] - inner_product(y[at.k0:k], M[i, at.k0:])) / M[i, k]
     elif rank == 1:
-        _one_unknown(M, r, y, at, damped)
-    elif rank > 0:
-        _least_squares(M, r, y, at, damped, work)
-
-
-@internal
-def _substitute(M, r, y, at):
-    """Write the solution of a square block into y."""
-    for k in range(at.k0, at.k1):
-        i = at.i0 + k - at.k0
-        y[k] = (r[i] - inner_product(y[at.k0:k], M[i, at.k0:])) / M[i, k]
+        k, along, square = at.k0, 0.0, damped * damped
+        for i in range(at.i0, at.i1):
+            along += M[i, k] * r[i]
+            square += M[i, k] * M[i, k]
+        y[k] = along / square
+    elif rank > 0:  # by reflections of [M r; lambda I 0]
+        height = rows + rank if damped > 0.0 else rows
+        T, _ = matrix(work, 0, rank + 1, height)
+        for k in range(rank + 1):
+            for i in range(rows):
+                T[k, i] = M[at.i0 + i, at.k0 + k] if k < rank else r[at.i0 + i]
+            for i in range(rows, height):
+                T[k, i] = damped if i - rows == k else 0.0
+        least_squares(T[:rank], T[rank], y[at.k0:])
 
 
 @internal
@@ -130,27 +135,3 @@ def _rotate(V, i, j, cosine, t):
         above = V[i, k]
         V[i, k] = cosine * (above - t * V[j, k])
         V[j, k] = cosine * (t * above + V[j, k])
-
-
-@internal
-def _one_unknown(M, r, y, at, damped):
-    """Write the minimiser into y."""
-    k, along, square = at.k0, 0.0, damped * damped
-    for i in range(at.i0, at.i1):
-        along += M[i, k] * r[i]
-        square += M[i, k] * M[i, k]
-    y[k] = along / square
-
-
-@internal
-def _least_squares(M, r, y, at, damped, work):
-    """Write the minimiser into y, by reflections of [M r; lambda I 0]."""
-    p, rows = at.k1 - at.k0, at.i1 - at.i0
-    height = rows + p if damped > 0.0 else rows
-    T, _ = matrix(work, 0, p + 1, height)
-    for k in range(p + 1):
-        for i in range(rows):
-            T[k, i] = M[at.i0 + i, at.k0 + k] if k < p else r[at.i0 + i]
-        for i in range(rows, height):
-            T[k, i] = damped if i - rows == k else 0.0
-    least_squares(T[:p], T[p], y[at.k0:])

@@ -10,42 +10,23 @@ learns how much it needs before it uses any of it. Such a tuple of views, made i
 passed to inlined helpers, costs nothing.
 """
 
-from typing import Any, NamedTuple
+from collections import namedtuple
 
 from hierarchy.jit import as_integers, as_matrix, inlined
 from solvers.kernels.tolerances import CANCELLED
 
-View = Any  # an array to the reader; numba infers a type
+Rows = namedtuple("Rows", "W row zero miss")
+"""Rows during a factorisation, each level in pivot order.
 
+W (m, n): the rows. row (m,) int64: their indices in the problem. zero (m,): squared norm at or
+below which the remainder of a row counts as zero. miss (m,): the residual of each row.
+"""
 
-class Rows(NamedTuple):
-    """Rows during a factorisation, each level in pivot order.
+Block = namedtuple("Block", "i0 i1 k0 k1")
+"""One level's part of a staircase: rows i0 .. i1 - 1, and the columns k0 .. k1 - 1 it adds."""
 
-    W (m, n): the rows. row (m,) int64: their indices in the problem. zero (m,): squared norm at or
-    below which the remainder of a row counts as zero. miss (m,): the residual of each row.
-    """
-
-    W: View
-    row: View
-    zero: View
-    miss: View
-
-
-class Block(NamedTuple):
-    """One level's part of a staircase: rows i0 .. i1 - 1, and the columns k0 .. k1 - 1 it adds."""
-
-    i0: View
-    i1: View
-    k0: View
-    k1: View
-
-
-class Settings(NamedTuple):
-    """The settings that all resolvers share, see `Resolver`; first in the array of settings."""
-
-    damping: View
-    threshold: View
-    rank_tolerance: View
+Settings = namedtuple("Settings", "damping threshold rank_tolerance")
+"""The settings that all resolvers share, see `Resolver`; first in the array of settings."""
 
 
 @inlined
