@@ -107,11 +107,11 @@ def digest() -> str:
 def _code(functions: dict[str, Any], target: str) -> tuple[Any, Any]:
     """Return an LLVM module with functions, made ahead or now, and the machine that it is for."""
     from hierarchy.jit import announce_compilation
-    from hierarchy.jit.caching import FOLDER, PROCESSOR, parts, suits
+    from hierarchy.jit.caching import PROCESSOR, Part, parts, suits
     from hierarchy.jit.exporting import lowered, stored
     from hierarchy.jit.linking import Machine, machine
 
-    module = stored(FOLDER / "solvers.bc", functions)
+    module = stored(Part.read("solvers"), functions)
     if module is None:
         announce_compilation()
         module = lowered(functions)
