@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from hierarchy.problem import Array
-from hierarchy.robots.from_table import ROOT
+from hierarchy.robots.from_table import add_joint, empty
 from hierarchy.robots.joints import check_size
 from hierarchy.robots.library import pin
 from hierarchy.robots.mjcf.part import WORLD, Part, disabled
@@ -46,14 +46,11 @@ class Built:
 
 def build(part: Part) -> Built:
     """Build the model: joints, inertias, armature, gravity and frames, but no limits."""
-    mj, built = part.compiled.model, Built(part, pin.Model())
-    built.model.name = str(part.compiled.file)
+    mj = part.compiled.model
+    built = Built(part, empty(part.compiled.file, "floating" if part.on_base else "fixed"))
     weight = 0.0 if disabled(mj, "gravity") else 1.0
     built.model.gravity.linear = weight * np.array(mj.opt.gravity)
-    base = 0
-    if part.on_base:
-        base = _add(built.model, 0, pin.JointModelFreeFlyer(), pin.SE3.Identity(), ROOT)
-    built.placed.append((base, pin.SE3.Identity()))
+    built.placed.append((built.model.njoints - 1, pin.SE3.Identity()))
     for body in range(1, mj.nbody):
         _place(built, body)
     for body in sorted(part.bodies):
@@ -91,8 +88,8 @@ def _place(built: Built, body: int) -> None:
             along = kind in ("slide", "hinge")
             reference = _motion(kind, axis, -mj.qpos0[places]) if along else pin.SE3.Identity()
             joint = _MODELS[kind](*([axis] if along else []))
-            parent = built.joints[j] = _add(built.model, parent, joint, place * at * reference,
-                                            part.compiled.joints[j])
+            parent = built.joints[j] = add_joint(
+                built.model, parent, joint, place * at * reference, part.compiled.joints[j])
             place = at.inverse()
             built.qpos.extend(places)
             built.dofs.extend(mj.jnt_dofadr[j] + np.arange(joint.nv))
@@ -109,8 +106,7 @@ _MODELS = {"slide": pin.JointModelPrismaticUnaligned, "hinge": pin.JointModelRev
 def _motion(kind: str, axis: Array, q: Array) -> Any:
     """Return how a joint at q, in our order, moves its body."""
     if len(q) > 1:
-        return pose(q[:-4], np.roll(q[-4:], 1)) if kind == "free" else pose(
-            np.zeros(3), np.roll(q, 1))
+        return pose(q[:3] if kind == "free" else np.zeros(3), np.roll(q[-4:], 1))
     if kind == "slide":
         return pin.SE3(np.eye(3), axis * q[0])
     return pin.SE3(pin.AngleAxis(float(q[0]), axis).toRotationMatrix(), np.zeros(3))
@@ -120,12 +116,6 @@ def pose(position: Array, quaternion: Array) -> Any:
     """Return a placement with a quaternion w, x, y, z of MuJoCo."""
     w, x, y, z = quaternion / np.linalg.norm(quaternion)
     return pin.SE3(pin.Quaternion(w, x, y, z).toRotationMatrix(), np.array(position))
-
-
-def _add(model: Any, parent: int, joint: Any, place: Any, name: str) -> int:
-    index = int(model.addJoint(parent, joint, place, name))
-    model.addJointFrame(index, -1)
-    return index
 
 
 def add_frame(model: Any, name: str, joint: int, place: Any, kind: str) -> str:
@@ -187,6 +177,7 @@ def compare(built: Built) -> None:
     steps = np.random.default_rng(0).uniform(-_REACH, _REACH, (_SAMPLES, model.nv))
     if built.part.on_base:  # which MuJoCo has not
         steps[:, :6] = 0.0
+    index = {frame.name: i for i, frame in enumerate(model.frames)}
     for step in (np.zeros(model.nv), *steps):
         q = np.asarray(pin.integrate(model, configuration(built, mj.qpos0), step))
         data.qpos[:] = built.part.held
@@ -194,14 +185,13 @@ def compare(built: Built) -> None:
         for stage in ("mj_kinematics", "mj_comPos", "mj_tendon", "mj_transmission", "mj_makeM"):
             getattr(mujoco, stage)(mj, data)
         pin.framesForwardKinematics(model, own, q)
-        index = {frame.name: i for i, frame in enumerate(model.frames)}
         for what, found, position, rotation in (
                 *((f"body {name!r}", own.oMf[index[name]], data.xpos[i], data.xmat[i])
                   for i, name in built.bodies.items()),
                 *((f"site {name!r}", own.oMf[index[name]], data.site_xpos[i], data.site_xmat[i])
                   for i, name in built.sites.items())):
-            off = max(np.abs(found.translation - position).max(),
-                      np.abs(found.rotation.ravel() - rotation).max())
+            off = np.abs([*(found.translation - position), *(found.rotation.ravel() - rotation)]
+                         ).max()
             if not off <= _SAME * max(1.0, np.abs(position).max()):
                 raise file.error(f"{what} is {off:.2g} from where MuJoCo has it")
         _compare_inertia(built, q, pin.crba(model, own, q), data, mujoco.mj_mulM)
