@@ -10,8 +10,7 @@ import hashlib
 import platform
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
-from dataclasses import dataclass
-from typing import Any, final
+from typing import Any, NamedTuple
 
 import numba
 import numpy as np
@@ -49,17 +48,14 @@ _OPTIONS = {"nopython": True, "error_model": "numpy", "_nrt": False,
             "no_cpython_wrapper": True, "no_cfunc_wrapper": True}
 
 
-@final
-@dataclass(frozen=True)
-class Entry:
+class Entry(NamedTuple):
     """A function without arrays among its arguments, to be called from C.
 
-    function : takes `arguments` numbers of type INTEGER and returns one of type `result`.
+    function : takes numbers of type INTEGER and returns one of type `result`.
     failed : what the entry returns if the function ends in an error of Python.
     """
 
     function: Kernel
-    arguments: int
     result: Any
     failed: int
 
@@ -94,8 +90,8 @@ def _library(entries: Mapping[str, Entry]) -> Any:
             flags.no_compile = True  # not yet: the entry is still to come
             compiled = compiler.compile_extra(
                 target.typing_context, target.target_context, entry.function,
-                args=(INTEGER,) * entry.arguments, return_type=entry.result, flags=flags,
-                locals={}, library=library)
+                args=(INTEGER,) * entry.function.__code__.co_argcount,
+                return_type=entry.result, flags=flags, locals={}, library=library)
             library.add_ir_module(_c_entry(name, compiled.fndesc, entry.failed))
     return library
 
