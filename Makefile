@@ -72,7 +72,7 @@ dist: export SOURCE_DATE_EPOCH ?= $(shell git log -1 --format=%ct 2>/dev/null ||
 dist: set-up
 	@rm -rf dist build
 	@$(BIN)/python -m build --no-isolation --outdir dist
-	@if [ -e hierarchy/jit/objects/solvers.o ] && [ "$$(uname -sm)" = "Linux x86_64" ]; then \
+	@if [ -e hierarchy/jit/objects/solvers.kernels ] && [ "$$(uname -sm)" = "Linux x86_64" ]; then \
 	  for machine in x86_64 aarch64; do \
 	    $(BIN)/python -m build --no-isolation --wheel --outdir dist $(PLATFORM)$$machine; done; fi
 	@cd dist && tar xzf *.tar.gz && rm *.tar.gz && for archive in */; do \

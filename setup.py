@@ -38,4 +38,4 @@ setup(long_description=page(URL),
       long_description_content_type="text/markdown", include_package_data=True,
       packages=["task_hierarchy", *INSIDE] if MOVED else NAMES,
       package_dir=INSIDE if MOVED else {},
-      package_data={f"{'task_hierarchy.inside.' * MOVED}hierarchy": ["jit/objects/*"]})
+      package_data={f"{'task_hierarchy.inside.' * MOVED}hierarchy": ["jit/objects/*.kernels"]})

@@ -1,9 +1,9 @@
 """Compiled kernels on disk: made when the package was built, or here when they were first needed.
 
-Ahead: object files, each with an index that has, for each kernel, the digest of the sources that it
-was made of and the types of arguments that there is code for. Another processor with Linux makes
-its own once, of the LLVM code beside. Any other call, and a kernel whose sources have changed
-since, is compiled when it is needed.
+Ahead: a file for each part, with machine code, the LLVM code of which another processor with Linux
+makes its own once, and for each kernel the digest of the sources that it was made of and the types
+of arguments that there is code for. Any other call, and a kernel whose sources have changed since,
+is compiled when it is needed.
 
 Then: one file for a kernel, the types of its arguments, and a machine. numba's own cache does not
 notice when a helper in another file has changed. Here the name of a file carries a digest of
@@ -16,7 +16,6 @@ from __future__ import annotations
 
 import ctypes
 import hashlib
-import json
 import os
 import pickle
 import stat
@@ -26,8 +25,10 @@ from contextlib import suppress
 from dataclasses import dataclass
 from functools import cache, cached_property
 from importlib import import_module
+from io import BytesIO
 from pathlib import Path
 from typing import Any, NamedTuple, final
+from zipfile import ZipFile, ZipInfo
 
 import llvmlite
 import numba
@@ -48,7 +49,6 @@ from hierarchy.jit.saying import say
 from hierarchy.jit.sources import described, source_digest
 
 _CHECKSUM = 32  # [B] at the beginning of a file
-_DIGEST = 64    # [B] of the functions of C, at the beginning of LLVM code
 
 
 class KernelCache(NullCache):  # type: ignore[misc]
@@ -108,40 +108,28 @@ class KernelCache(NullCache):  # type: ignore[misc]
 
 
 def _read(file: Path) -> bytes | None:
-    """Return the content of a file; None if it is missing, damaged or of another user."""
-    try:
-        with file.open("rb") as opened:
-            status = os.fstat(opened.fileno())
-            if sys.platform != "win32" and (status.st_uid not in (0, os.getuid())
-                                            or status.st_mode & (stat.S_IWGRP | stat.S_IWOTH)):
-                return None
-            return _body(file, opened.read())
-    except OSError:
-        return None
+    """Return what `write` wrote; None if it is missing, damaged, or another's to write."""
+    with suppress(OSError), file.open("rb") as opened:
+        status, content = os.fstat(opened.fileno()), opened.read()
+        if sys.platform == "win32" or (status.st_uid in (0, os.getuid())
+                                       and not status.st_mode & (stat.S_IWGRP | stat.S_IWOTH)):
+            body = content[_CHECKSUM:]
+            return body if content[:_CHECKSUM] == _checksum(file, body) else None
+    return None
 
 
-def _body(file: Path, content: bytes) -> bytes:
-    """Return what `write` wrote into a file; raises OSError if it is damaged."""
-    body = content[_CHECKSUM:]
-    if content[:_CHECKSUM] != _checksum(file, body):
-        raise OSError(f"{file} is damaged")
-    return body
-
-
-def write(file: Path, body: bytes) -> str:
-    """Write a file completely or not at all; others may read it. Returns its checksum."""
-    checksum = _checksum(file, body)
+def write(file: Path, body: bytes) -> None:
+    """Write a file completely or not at all; others may read it."""
     file.parent.mkdir(parents=True, exist_ok=True)
     number, name = tempfile.mkstemp(dir=file.parent)
     try:
         with os.fdopen(number, "wb") as opened:
-            opened.write(checksum + body)
+            opened.write(_checksum(file, body) + body)
         Path(name).chmod(0o644)
         Path(name).replace(file)
     except BaseException:
         Path(name).unlink()
         raise
-    return checksum.hex()
 
 
 def _checksum(file: Path, body: bytes) -> bytes:
@@ -182,7 +170,7 @@ _FEATURES = ("avx", "avx2", "bmi", "bmi2", "cx16", "f16c", "fma", "lzcnt", "movb
 
 
 class Code(NamedTuple):
-    """Code for one list of types: names in the object file, and what its environment holds.
+    """Code for one list of types: names in the machine code, and what its environment holds.
 
     digest : of the sources that the code was made of.
     """
@@ -193,39 +181,55 @@ class Code(NamedTuple):
     constants: tuple[str, ...]
 
 
+def _archive(name: str) -> ZipFile:
+    return ZipFile(FOLDER / f"{name}.kernels")
+
+
+def write_part(name: str, index: tuple[Any, ...], **code: bytes) -> None:
+    """Write a part: the fields of `Part` from `calls` to `externals`, and both kinds of code."""
+    made = BytesIO()
+    with ZipFile(made, "w") as archive:
+        for member, content in {"index": pickle.dumps(index), **code}.items():
+            archive.writestr(ZipInfo(member), content)  # without the time
+    write(FOLDER / f"{name}.kernels", made.getvalue())
+
+
 @final
 @dataclass(frozen=True)
 class Part:
-    """An object file and its index.
+    """Kernels that were compiled together: an object file, and the LLVM code that it was made of.
 
+    checksums : of the members of its file.
     calls : digest of the list of calls that it was made for.
-    checksums : of the object file (".o") and the LLVM code (".bc") that were made with the index.
+    functions : digest of the functions of C, which only the LLVM code has.
     entries : by name of the kernel and types of arguments, as `name(types)`.
     externals : the names that the object file expects to find.
     """
 
-    file: Path
+    name: str
+    checksums: dict[str, int]
     calls: str
-    checksums: dict[str, str]
+    functions: str
     entries: dict[str, Code]
     externals: tuple[str, ...]
 
     @staticmethod
-    def read(file: Path) -> Part | None:
-        """Read the index beside an object file; None if it is missing or damaged."""
-        try:
-            index = json.loads(shipped(file.with_suffix(".index")))
-            return Part(file, index["calls"], index["checksums"],
-                        {call: Code(**entry) for call, entry in index["entries"].items()},
-                        tuple(index["externals"]))
-        except (OSError, ValueError, LookupError, TypeError, AttributeError):
-            return None
+    def read(name: str) -> Part | None:
+        """Read a part without its code; None if its file is missing or damaged."""
+        with suppress(Exception), _archive(name) as opened:  # what damage raises, or an older form
+            return Part(name, {one.filename: one.CRC for one in opened.infolist()},
+                        *pickle.loads(opened.read("index")))
+        return None
 
-    def write(self) -> None:
-        """Write the index; the other files are there."""
-        index = {"calls": self.calls, "checksums": self.checksums, "externals": self.externals,
-                 "entries": {call: entry._asdict() for call, entry in self.entries.items()}}
-        write(self.file.with_suffix(".index"), json.dumps(index, indent=1).encode())
+    def code(self, kind: str) -> bytes:
+        """Return "machine" code, that of the object file, or "llvm" code.
+
+        Raises RuntimeError if it is damaged, or by now of another build.
+        """
+        with suppress(Exception), _archive(self.name) as opened:
+            if opened.getinfo(kind).CRC == self.checksums[kind]:
+                return opened.read(kind)
+        raise RuntimeError(f"{self.name}: its {kind} code is damaged or of another build")
 
     @cached_property
     def engine(self) -> Any:
@@ -236,8 +240,8 @@ class Part:
             return None
         try:
             made = llvm.ObjectFileRef.from_data(
-                self.content(".o") if suits() else self._made_here())
-        except (OSError, RuntimeError):  # no such file, or LLVM code of a newer LLVM
+                self.code("machine") if suits() else self._made_here())
+        except RuntimeError:  # or LLVM code of a newer LLVM
             return None
         target = llvm.Target.from_triple(llvm.get_process_triple())
         engine = llvm.create_mcjit_compiler(
@@ -247,30 +251,15 @@ class Part:
         engine.finalize_object()
         return engine
 
-    def content(self, kind: str) -> bytes:
-        """Return one of the files; raises OSError if it is missing, damaged or of another build."""
-        file = self.file.with_suffix(kind)
-        content = file.read_bytes()
-        if content[:_CHECKSUM].hex() != self.checksums[kind]:
-            raise OSError(f"{file} is of another build")
-        return _body(file, content)
-
-    def is_whole(self) -> bool:
-        """Whether the files are there and of one build."""
-        try:
-            return bool(self.content(".o") and self.content(".bc"))
-        except OSError:
-            return False
-
     def _made_here(self) -> bytes:
         """Return the object file for another processor, made of the LLVM code once."""
-        code, here, folder = self.content(".bc")[_DIGEST:], machine(), cache_folder()
+        code, here, folder = self.code("llvm"), machine(), cache_folder()
         about = hashlib.sha256(code + repr((here, llvmlite.__version__)).encode()).hexdigest()
-        file = None if folder is None else folder / f"{self.file.stem}-{about[:32]}.o"
+        file = None if folder is None else folder / f"{self.name}-{about[:32]}.o"
         kept = None if file is None else _read(file)
         if kept is not None:
             return kept
-        say(f"making code for this processor, once: {self.file.stem} ...")
+        say(f"making code for this processor, once: {self.name} ...")
         module = llvm.parse_bitcode(code)
         hide(module, {name for one in self.entries.values()
                       for name in (one.wrapper, one.environment)})
@@ -286,8 +275,6 @@ class Part:
             return None
         start = self.engine.get_function_address(entry.wrapper)
         place = self.engine.get_global_value_address(entry.environment)
-        if not (start and place):  # LLVM code of an earlier build
-            return None
         module = import_module(kernel.__module__)
         environment = Environment(vars(module))
         environment.env_name = entry.environment
@@ -309,25 +296,15 @@ def find(kernel: Any, kinds: tuple[Any, ...]) -> Any:
 
 @cache
 def parts() -> tuple[Part, ...]:
-    """Return the object files, from whose LLVM code this kind of machine can make its own."""
+    """Return what was compiled ahead, if this kind of machine can run it or make its own of it."""
     triple = llvm.get_process_triple()
     runs = triple.startswith(("x86_64", "aarch64")) and "linux" in triple
-    return tuple(filter(None, map(Part.read, sorted(FOLDER.glob("*.o"))))) if runs else ()
+    names = sorted(file.stem for file in FOLDER.glob("*.kernels")) if runs else []
+    return tuple(filter(None, map(Part.read, names)))
 
 
 @cache
 def suits() -> bool:
-    """Whether the object files are used as they are: this processor can run them."""
+    """Whether object files are used as they are: this processor can run them."""
     features = llvm.get_host_cpu_features()
     return not os.environ.get(NATIVE) and all(features.get(name) for name in _FEATURES)
-
-
-def shipped(file: Path) -> bytes:
-    """Return the content of a file of the package; raises OSError if it is missing or damaged."""
-    return _body(file, file.read_bytes())
-
-
-def read_code(file: Path) -> tuple[bytes, bytes]:
-    """Return the digest of the functions of C in a file of LLVM code, and the code."""
-    content = shipped(file)
-    return content[:_DIGEST], content[_DIGEST:]

@@ -6,19 +6,18 @@ compiled as it would be when called, for a processor that numba is told by its e
 process starts; only the machine code is made once, of all of them together.
 """
 
+import hashlib
 import platform
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from contextlib import suppress
-from dataclasses import dataclass
-from pathlib import Path
-from typing import Any, final
+from typing import Any, NamedTuple
 
 import numba
 import numpy as np
 from llvmlite import ir
 from numba.np import arrayobj
 
-from hierarchy.jit.caching import PROCESSOR, Code, Part, read_code, write
+from hierarchy.jit.caching import PROCESSOR, Code, Part, write_part
 from hierarchy.jit.compiling import Cached
 from hierarchy.jit.inside import (
     cgutils,
@@ -40,6 +39,7 @@ from hierarchy.jit.linking import (
     object_code,
     stripped,
 )
+from hierarchy.jit.saying import say
 from hierarchy.jit.sources import Kernel, kinds_in, source_digest
 
 INTEGER, STATUS = types.int64, types.int32  # of arguments and results; a pointer is an INTEGER too
@@ -48,17 +48,14 @@ _OPTIONS = {"nopython": True, "error_model": "numpy", "_nrt": False,
             "no_cpython_wrapper": True, "no_cfunc_wrapper": True}
 
 
-@final
-@dataclass(frozen=True)
-class Entry:
+class Entry(NamedTuple):
     """A function without arrays among its arguments, to be called from C.
 
-    function : takes `arguments` numbers of type INTEGER and returns one of type `result`.
+    function : takes numbers of type INTEGER and returns one of type `result`.
     failed : what the entry returns if the function ends in an error of Python.
     """
 
     function: Kernel
-    arguments: int
     result: Any
     failed: int
 
@@ -69,17 +66,16 @@ def lowered(entries: Mapping[str, Entry]) -> Any:
     return linked([_library(entries)], set(entries))
 
 
-def stored(file: Path, entries: Mapping[str, Entry]) -> Any:
-    """Return the module of these and other entries that `build` wrote; None if it does not suit."""
-    with suppress(OSError, RuntimeError):  # missing, or of a newer LLVM
-        digest, code = read_code(file)
-        if digest and digest == _digest(entries):
-            return llvm.parse_bitcode(code)
+def stored(part: Part | None, entries: Mapping[str, Entry]) -> Any:
+    """Return the module of these and other entries in a part; None if it does not suit."""
+    with suppress(RuntimeError):  # damaged, or of a newer LLVM
+        if part and part.functions == _digest(entries) != "":
+            return llvm.parse_bitcode(part.code("llvm"))
     return None
 
 
-def _digest(entries: Mapping[str, Entry]) -> bytes:
-    return source_digest(*(entry.function for entry in entries.values())).encode()
+def _digest(entries: Mapping[str, Entry]) -> str:
+    return source_digest(*(entry.function for entry in entries.values()))
 
 
 def _library(entries: Mapping[str, Entry]) -> Any:
@@ -94,8 +90,8 @@ def _library(entries: Mapping[str, Entry]) -> Any:
             flags.no_compile = True  # not yet: the entry is still to come
             compiled = compiler.compile_extra(
                 target.typing_context, target.target_context, entry.function,
-                args=(INTEGER,) * entry.arguments, return_type=entry.result, flags=flags,
-                locals={}, library=library)
+                args=(INTEGER,) * entry.function.__code__.co_argcount,
+                return_type=entry.result, flags=flags, locals={}, library=library)
             library.add_ir_module(_c_entry(name, compiled.fndesc, entry.failed))
     return library
 
@@ -145,33 +141,30 @@ ENVIRONMENT = {  # of a process that builds
 
 
 @global_compiler_lock  # type: ignore[untyped-decorator]
-def build(file: Path, of: str, calls: Sequence[str], say: Callable[[int], None],
-          functions: Mapping[str, Entry]) -> None:
-    """Write an object file with these calls, whose list has the digest `of`.
+def build(name: str, calls: Sequence[str], functions: Mapping[str, Entry]) -> int:
+    """Write a part with these calls and functions; return the size of its machine code [B].
 
-    calls : each `name(types)`, as `described` writes types. say : takes the number compiled.
-    functions : of C. LLVM code of calls and functions is written too, for other processors and
-        for `stored`.
+    calls : each `name(types)`, as `described` writes types. functions : of C, for `stored`.
     """
     Library.running = Cached.kept = False
     # Machine code was made of that of this process, which wrote instructions of x86-64 into it.
     rtsys._library = compile_nrt_functions(registry.cpu_target.target_context)
-    entries, libraries = _compiled(calls, say)
+    entries, libraries = _compiled(name, calls)
     if functions:
         libraries.append(_library(functions))
     names = {name for entry in entries.values() for name in (entry.wrapper, entry.environment)}
     whole = linked(libraries, {*names, *functions})
-    code = _digest(functions) + stripped(whole.clone()).as_bitcode()
-    checksums = {".bc": write(file.with_suffix(".bc"), code)}
+    code = stripped(whole.clone()).as_bitcode()
     hide(whole, names)
-    checksums[".o"] = write(file, object_code(whole, machine()))
+    machine_code = object_code(whole, machine())
     externals = sorted(one.name for one in (*whole.functions, *whole.global_variables)
                        if one.is_declaration and not one.name.startswith("llvm."))
-    Part(file, of, checksums, entries, tuple(externals)).write()
+    write_part(name, (_of(calls), _digest(functions), entries, externals),
+               machine=machine_code, llvm=code)
+    return len(machine_code)
 
 
-def _compiled(calls: Sequence[str], say: Callable[[int], None]
-              ) -> tuple[dict[str, Code], list[Any]]:
+def _compiled(part: str, calls: Sequence[str]) -> tuple[dict[str, Code], list[Any]]:
     """Return how to find each call in an object file, and numba's libraries with their code.
 
     A call whose environment holds other than types of numbers is left out.
@@ -179,7 +172,8 @@ def _compiled(calls: Sequence[str], say: Callable[[int], None]
     entries: dict[str, Code] = {}
     libraries: list[Any] = []
     for count, call in enumerate(calls):
-        say(count)
+        if count % 20 == 0:
+            say(f"{part}: {count} of {len(calls)}")
         name, _, text = call.removesuffix(")").partition("(")
         kernel, kinds = found(name), kinds_in(text)
         kernel.compile(kinds)
@@ -192,9 +186,13 @@ def _compiled(calls: Sequence[str], say: Callable[[int], None]
     return entries, libraries
 
 
-def is_current(file: Path, of: str) -> bool:
-    """Whether an object file was made of this list of calls from the sources as they are."""
-    part = Part.read(file)
-    return part is not None and part.calls == of and part.is_whole() and all(
+def is_current(name: str, calls: Sequence[str], functions: Mapping[str, Entry]) -> bool:
+    """Whether a part was made of this list of calls and these functions as their sources are."""
+    part = Part.read(name)
+    return part is not None and part.calls == _of(calls) and bool(stored(part, functions)) and all(
         entry.digest == source_digest(found(call.partition("(")[0]))
         for call, entry in part.entries.items())
+
+
+def _of(calls: Sequence[str]) -> str:
+    return hashlib.sha256("\n".join(calls).encode()).hexdigest()

@@ -162,22 +162,11 @@ def _view(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
     return view._getvalue()
 
 
-if numba.config.DISABLE_JIT:
-    def inner_product(left: Any, right: Any) -> Any:
-        """See `_inner_product`."""
-        return np.dot(left, right[:left.size])
-
-    def add_multiple(w: Any, factor: Any, v: Any) -> None:
-        """See `_add_multiple`."""
-        w[:v.size] += factor * v
-
-    def as_matrix(numbers: Any, rows: int, columns: int) -> Any:
-        """See `_as_matrix`."""
-        return numbers.reshape((rows, columns))
-
-    def as_integers(numbers: Any) -> Any:
-        """See `_as_integers`."""
-        return numbers.view(np.int64)
-else:
-    inner_product, add_multiple, as_matrix, as_integers = map(
-        intrinsic, (_inner_product, _add_multiple, _as_matrix, _as_integers))
+_IN_NUMPY: tuple[Callable[..., Any], ...] = (
+    lambda left, right: np.dot(left, right[:left.size]),
+    lambda w, factor, v: np.add(w[:v.size], factor * v, out=w[:v.size]),
+    lambda numbers, rows, columns: numbers.reshape((rows, columns)),
+    lambda numbers: numbers.view(np.int64))
+inner_product, add_multiple, as_matrix, as_integers = (
+    _IN_NUMPY if numba.config.DISABLE_JIT else
+    map(intrinsic, (_inner_product, _add_multiple, _as_matrix, _as_integers)))

@@ -7,16 +7,13 @@ import gc
 import re
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass
 from importlib import import_module
-from typing import Any, final
+from typing import Any, NamedTuple
 
 from hierarchy.jit.inside import Codegen, CodeLibrary, CPUContext, llvm, registry
 
 
-@final
-@dataclass(frozen=True)
-class Machine:
+class Machine(NamedTuple):
     """What code is compiled for, in LLVM's words; empty features: those of the processor."""
 
     triple: str

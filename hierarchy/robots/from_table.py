@@ -25,20 +25,18 @@ def from_table(table: Table, base: Base | None = None) -> Found:
 
 
 def _from_chain(table: DHTable, base: Base) -> Found:
-    model = _empty(table.name, base)
+    model = empty(table.name, base)
     root = joint = model.njoints - 1
     placement, links = pin.SE3.Identity(), list[Capsule]()
     for i, d in enumerate(table.d):
         limit = np.deg2rad([table.range[i]])
-        joint = model.addJoint(joint, pin.JointModelRZ(), placement, f"joint_{i + 1}",
-                               np.array([table.effort[i]]), np.array([table.velocity[i]]),
-                               -limit, limit)
+        joint = add_joint(model, joint, pin.JointModelRZ(), placement, f"joint_{i + 1}",
+                          np.array([table.effort[i]]), np.array([table.velocity[i]]), -limit, limit)
         alpha = np.deg2rad(table.alpha[i])
         c, s = np.round([np.cos(alpha), np.sin(alpha)], 15)  # exact for multiples of 90 degrees
         placement = pin.SE3(np.array([[1.0, 0.0, 0.0], [0.0, c, -s], [0.0, s, c]]),
                             np.array([table.a[i], 0.0, d]))
         model.appendBodyToJoint(joint, _rod(table, i), pin.SE3.Identity())
-        model.addJointFrame(joint, -1)
         if (end := (table.a[i], 0.0, d)) != _HERE:  # neighbours cover a link of length zero
             links.append(Capsule(f"link {i + 1}", joint, _HERE, end, table.radius))
     model.addFrame(pin.Frame(END_EFFECTOR, joint, placement, pin.FrameType.OP_FRAME))
@@ -47,15 +45,13 @@ def _from_chain(table: DHTable, base: Base) -> Found:
 
 
 def _from_tree(table: TreeTable, base: Base) -> Found:
-    model = _empty(table.name, base)
+    model = empty(table.name, base)
     root = model.njoints - 1
     for joint in table.joints:
         lower, upper = np.deg2rad(joint.range)
-        index = model.addJoint(
-            _index(model, joint.parent, root), _REVOLUTE[joint.axis](),
-            pin.SE3(np.eye(3), np.array(joint.at)), joint.name, np.array([joint.effort]),
-            np.array([joint.velocity]), np.array([lower]), np.array([upper]))
-        model.addJointFrame(index, -1)
+        add_joint(model, _index(model, joint.parent, root), _REVOLUTE[joint.axis](),
+                  pin.SE3(np.eye(3), np.array(joint.at)), joint.name, np.array([joint.effort]),
+                  np.array([joint.velocity]), np.array([lower]), np.array([upper]))
     seen, capsules = Counter[str](), list[Capsule]()
     for name, link in (*((joint.name, joint.link) for joint in table.joints), *table.links):
         index = _index(model, name, root)
@@ -77,13 +73,20 @@ def _from_tree(table: TreeTable, base: Base) -> Found:
                  _points(model, table.control_points, root), q, table=table)
 
 
-def _empty(name: str, base: Base) -> Any:
+def empty(name: str, base: Base) -> Any:
+    """Return a model without bodies; its last joint is the floating base, or the world."""
     model = pin.Model()
     model.name = name
     if base == "floating":
-        joint = model.addJoint(0, pin.JointModelFreeFlyer(), pin.SE3.Identity(), ROOT)
-        model.addJointFrame(joint, -1)
+        add_joint(model, 0, pin.JointModelFreeFlyer(), pin.SE3.Identity(), ROOT)
     return model
+
+
+def add_joint(model: Any, parent: int, joint: Any, place: Any, name: str, *limits: Array) -> int:
+    """Add a joint and its frame, and return its index; `limits` as pinocchio takes them."""
+    index = int(model.addJoint(parent, joint, place, name, *limits))
+    model.addJointFrame(index, -1)
+    return index
 
 
 def _points(model: Any, points: tuple[tuple[str, Vector], ...], root: int

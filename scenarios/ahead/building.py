@@ -1,6 +1,6 @@
-"""Compile kernels ahead: `python -m scenarios.ahead` writes the object files of the package.
+"""Compile kernels ahead: `python -m scenarios.ahead` writes the machine code of the package.
 
-With each it writes LLVM code, from which other processors make their object files and `hierarchy
+With it goes LLVM code, from which other processors make their object files and `hierarchy
 library` the C library. With the name of a part it writes that one; `solvers` and `others` need
 nothing but numba and scipy.
 
@@ -8,7 +8,6 @@ nothing but numba and scipy.
 call: each kind of call of the documents, once.
 """
 
-import hashlib
 import os
 import re
 import sys
@@ -23,6 +22,9 @@ from typing import Any
 
 import numpy as np
 
+from hierarchy.jit import exporting
+from hierarchy.jit.compiling import asked
+from hierarchy.jit.saying import say
 from scenarios.results.pool import ended
 
 CALLS = Path(__file__).with_name("calls.txt")
@@ -44,9 +46,7 @@ _PYTHON = re.compile(r"^```python\n(.*?)^```", re.DOTALL | re.MULTILINE)
 
 
 def main() -> None:
-    """Write the object files of the parts that are named, or all, unless they are current."""
-    from hierarchy.jit.exporting import ENVIRONMENT
-
+    """Compile the parts that are named, or all, unless they are current."""
     names = sys.argv[1:]
     if names == ["record"]:
         CALLS.write_text("".join(f"{call}\n" for call in _recorded()))
@@ -54,26 +54,19 @@ def main() -> None:
     begun = monotonic()
     parts = [part for part in names or list(PARTS)[::-1] if not is_current(part)]
     for part in parts:
-        _say(f"{part}.o: compiling {len(_calls(part))} entries of kernels, once ...")
-    os.environ.update(ENVIRONMENT)  # of the processes that compile
+        say(f"{part}: compiling {len(_calls(part))} entries of kernels, once ...")
+    os.environ.update(exporting.ENVIRONMENT)  # of the processes that compile
     for part, size in ended(compile_part, parts):
-        _say(f"{part}.o: {size / 1e6:.2f} MB after {monotonic() - begun:.0f} s")
+        say(f"{part}: {size / 1e6:.2f} MB after {monotonic() - begun:.0f} s")
 
 
 def is_current(part: str) -> bool:
-    """Whether the object file of a part was made of the calls and sources as they are."""
-    from hierarchy.jit import exporting
-    from hierarchy.jit.caching import FOLDER
-
-    file, functions = FOLDER / f"{part}.o", _functions(part)
-    return (exporting.is_current(file, _digest(_calls(part)))
-            and exporting.stored(file.with_suffix(".bc"), functions) is not None)
+    """Whether a part was compiled of the calls and sources as they are."""
+    return exporting.is_current(part, _calls(part), _functions(part))
 
 
 def record(job: str) -> list[str]:
     """Return the calls of kernels that a job makes, and those of this process before it."""
-    from hierarchy.jit.compiling import asked
-
     with (redirect_stdout(StringIO()), redirect_stderr(StringIO()),
           tempfile.TemporaryDirectory() as folder):
         JOBS[job](Path(folder))
@@ -81,14 +74,9 @@ def record(job: str) -> list[str]:
 
 
 def compile_part(part: str) -> int:
-    """Write one object file and return its size [B]."""
-    from hierarchy.jit.caching import FOLDER
-    from hierarchy.jit.exporting import build
-
-    file, calls = FOLDER / f"{part}.o", _calls(part)
-    build(file, _digest(calls), calls, lambda count: None if count % 20 else _say(
-        f"{part}: {count} of {len(calls)}"), _functions(part))
-    return file.stat().st_size
+    """Compile a part and return the size of its machine code [B]."""
+    size: int = exporting.build(part, _calls(part), _functions(part))
+    return size
 
 
 def _recorded() -> list[str]:
@@ -112,14 +100,6 @@ def _functions(part: str) -> dict[str, Any]:
     from solvers.library.entries import FUNCTIONS
 
     return FUNCTIONS if part == "solvers" else {}
-
-
-def _digest(calls: list[str]) -> str:
-    return hashlib.sha256("\n".join(calls).encode()).hexdigest()
-
-
-def _say(what: str) -> None:
-    print(f"task-hierarchy: {what}", file=sys.stderr, flush=True)
 
 
 def _run(scenario: str, folder: Path, *options: str) -> None:

@@ -68,35 +68,30 @@ settings (6,): those of a kernel, not yet written. work: the rest of the work sp
 @internal
 def can_open(problem, settings, record, x, work, size):
     """Return SOLVED if a call can be opened, else INVALID or TOO_SMALL."""
-    code = judged_problem(problem)
-    if code == SOLVED and (record == 0 or x == 0 or work == 0 or not _in_range(settings)):
-        code = INVALID
-    if code == SOLVED:
-        words, state = integers_at(problem, PROBLEM), integers_at(record, RECORD)
-        n, m, levels = words[N], words[M], words[LEVELS]
-        if size < work_size(n, m, levels) or state[SIZE] < record_size(n, m, levels):
-            code = TOO_SMALL
-        elif state[VALUES] == 0:
-            code = INVALID
-    return code
+    if not _is_sound(problem) or record == 0 or x == 0 or work == 0 or not _in_range(settings):
+        return INVALID
+    words, state = integers_at(problem, PROBLEM), integers_at(record, RECORD)
+    n, m, levels = words[N], words[M], words[LEVELS]
+    if size < work_size(n, m, levels) or state[SIZE] < record_size(n, m, levels):
+        return TOO_SMALL
+    return SOLVED if state[VALUES] != 0 else INVALID
 
 
 @inlined
-def judged_problem(problem):
-    """Return SOLVED, or INVALID for sizes that do not add up or a missing array."""
+def _is_sound(problem):
+    """Whether the sizes of a problem add up and none of its arrays is missing."""
     if problem == 0:
-        return INVALID
+        return False
     words = integers_at(problem, PROBLEM)
     n, m, levels = words[N], words[M], words[LEVELS]
-    if not in_range(n, m, levels) or (levels > 0 and words[SIZES] == 0):
-        return INVALID
-    if m > 0 and (words[A] == 0 or words[LOWER] == 0 or words[UPPER] == 0):
-        return INVALID
+    if not in_range(n, m, levels) or (levels > 0 and words[SIZES] == 0) or (
+            m > 0 and (words[A] == 0 or words[LOWER] == 0 or words[UPPER] == 0)):
+        return False
     sizes, rows, sane = integers_at(words[SIZES], levels), 0, True
     for k in range(levels):
         sane &= 0 <= sizes[k] <= m
         rows += sizes[k]
-    return SOLVED if sane and rows == m else INVALID
+    return sane and rows == m
 
 
 @inlined
@@ -216,7 +211,7 @@ def entry(solve: Callable[..., int]) -> Entry:
         write_exact(call.settings, s)
         return closed(call, solve(call, s))
 
-    return Entry(entered, 6, STATUS, NUMERICAL_FAILURE)
+    return Entry(entered, STATUS, NUMERICAL_FAILURE)
 
 
 def fixed(n: int, m: int, levels: int) -> Entry:
@@ -240,7 +235,7 @@ def fixed(n: int, m: int, levels: int) -> Entry:
         call.state[WARM] = 1
         return closed(call, code)
 
-    return Entry(entered, 6, STATUS, NUMERICAL_FAILURE)
+    return Entry(entered, STATUS, NUMERICAL_FAILURE)
 
 
 @inlined
@@ -321,7 +316,7 @@ def solve_tpm(call, s):
 
 def violations_at(problem, x, norms):
     """Write like `Hierarchy.violations`; infinity where that is not finite."""
-    if judged_problem(problem) != SOLVED or x == 0 or norms == 0:
+    if not _is_sound(problem) or x == 0 or norms == 0:
         return np.int32(INVALID)
     words, row, finite = integers_at(problem, PROBLEM), 0, True
     n, m, levels = words[N], words[M], words[LEVELS]
@@ -331,25 +326,18 @@ def violations_at(problem, x, norms):
     for k in range(levels):
         total = 0.0
         for _ in range(sizes[k]):
-            total += squared_violation(rows[row], lower[row], upper[row], x)
+            value = 0.0
+            for c in range(n):
+                value += rows[row, c] * x[c]
+            for miss in (value - upper[row], lower[row] - value):
+                if not miss <= 0.0:  # NaN too
+                    total += miss * miss
+            if not lower[row] <= upper[row]:
+                total = np.inf
             row += 1
         norms[k] = np.sqrt(total) if total < np.inf else np.inf
         finite &= norms[k] < np.inf
     return np.int32(SOLVED if finite else NUMERICAL_FAILURE)
-
-
-@inlined
-def squared_violation(a, lower, upper, x):
-    """Return the square of the violation of lower <= a x <= upper; NaN or inf for spoilt data."""
-    value = 0.0
-    for c in range(x.size):
-        value += a[c] * x[c]
-    over, under, squared = value - upper, lower - value, 0.0
-    if not over <= 0.0:  # NaN too
-        squared = over * over
-    if not under <= 0.0:
-        squared += under * under
-    return squared if lower <= upper else np.inf
 
 
 def verify_x(problem, settings, record, x, work, size):
@@ -373,20 +361,17 @@ def verify_x(problem, settings, record, x, work, size):
                                   call.settings, call.work[2 * n + m:]))
 
 
-def size_of_work(n, m, levels):
-    """Return the numbers that a work space needs, -1 for sizes out of range."""
-    return work_size(n, m, levels) if in_range(n, m, levels) else -1
+def sized(size: Callable[[int, int, int], int]) -> Entry:
+    """Return the function of C around a size for n, m and levels; -1 where they are no sizes."""
+    def entered(n, m, levels):
+        return size(n, m, levels) if in_range(n, m, levels) else -1
 
-
-def size_of_record(n, m, levels):
-    """Return the numbers that a record needs, -1 for sizes out of range."""
-    return record_size(n, m, levels) if in_range(n, m, levels) else -1
+    return Entry(entered, INTEGER, -1)
 
 
 FUNCTIONS = {"th_solve_hcod": entry(solve_hcod), "th_solve_tpm": entry(solve_tpm),
              "th_solve_recursive": entry(solve_recursive), "th_solve_sns": entry(solve_sns),
-             "th_solve_merged": entry(solve_merged),
-             "th_work_size": Entry(size_of_work, 3, INTEGER, -1),
-             "th_record_size": Entry(size_of_record, 3, INTEGER, -1),
-             "th_verify": Entry(verify_x, 6, STATUS, NUMERICAL_FAILURE),
-             "th_violations": Entry(violations_at, 3, STATUS, NUMERICAL_FAILURE)}
+             "th_solve_merged": entry(solve_merged), "th_work_size": sized(work_size),
+             "th_record_size": sized(record_size),
+             "th_verify": Entry(verify_x, STATUS, NUMERICAL_FAILURE),
+             "th_violations": Entry(violations_at, STATUS, NUMERICAL_FAILURE)}

@@ -16,7 +16,7 @@ from dataclasses import dataclass
 from importlib.metadata import distribution, version
 from importlib.resources import files
 from pathlib import Path
-from typing import Any, NamedTuple, final
+from typing import Any, final
 
 from hierarchy.errors import HierarchyError, check_name
 
@@ -35,27 +35,20 @@ _MOST_FIXED = 100
 _MAGIC = b"!<arch>\n"  # of a static library
 
 
-class Emitted(NamedTuple):
-    """An object file, the names of the functions in it, and the machine that it is for.
+_TEXT = """
+@{name}_text = constant [{size} x i8] c"{text}\\00"
+define ptr @{name}() {{
+  ret ptr @{name}_text
+}}
+"""
 
-    digest : of the sources of the kernels, see `source_digest`.
+
+def _emitted(resolvers: Sequence[str], target: str, fix: Sequence[int], texts: dict[str, str]
+             ) -> tuple[bytes, tuple[str, ...], str]:
+    """Return an object file, the names of the functions in it, and the machine that it is for.
+
+    texts : what further functions return, by name.
     """
-
-    content: bytes
-    symbols: tuple[str, ...]
-    machine: str
-    digest: str
-
-
-def emitted(resolvers: Sequence[str], target: str, fix: Sequence[int] = ()) -> Emitted:
-    """Return the object file of these resolvers for a target.
-
-    fix : sizes (n, m, levels) for which `hcod` has code of its own, see `fixed`.
-
-    Raises HierarchyError: an unknown or missing resolver or target, kernels are not compiled, or
-    this LLVM or this machine cannot make code for the target.
-    """
-    check(resolvers, target, fix)
     import llvmlite.binding as llvm
     import numba
 
@@ -66,11 +59,11 @@ def emitted(resolvers: Sequence[str], target: str, fix: Sequence[int] = ()) -> E
         raise HierarchyError("kernels are not compiled: NUMBA_DISABLE_JIT is set")
     others = {f"th_solve_{name}" for name in set(RESOLVERS).difference(resolvers)}
     functions = {name: FUNCTIONS[name] for name in FUNCTIONS if name not in others}
-    (module, machine), found = _code(functions, target), digest()
+    module, machine = _code(functions, target)
     if fix:
         _fix(module, fix)
-    texts = {"th_version": version(_PACKAGE), "th_digest": found}
-    module.link_in(llvm.parse_assembly(_texts(texts)))
+    for name, text in texts.items():
+        module.link_in(llvm.parse_assembly(_TEXT.format(name=name, text=text, size=len(text) + 1)))
     symbols = (*functions, *texts)
     hide(module, set(symbols))
     try:
@@ -78,10 +71,10 @@ def emitted(resolvers: Sequence[str], target: str, fix: Sequence[int] = ()) -> E
     except RuntimeError as error:
         raise HierarchyError(f"this llvmlite has no back end for {machine.triple}: {error}"
                              ) from error
-    return Emitted(code, symbols, f"{machine.triple}, {machine.processor}", found)
+    return code, symbols, f"{machine.triple}, {machine.processor}"
 
 
-def check(resolvers: Sequence[str], target: str, fix: Sequence[int] = ()) -> None:
+def _check(resolvers: Sequence[str], target: str, fix: Sequence[int]) -> None:
     """Raise a HierarchyError for a wrong name or size, or a machine without objects in ELF."""
     check_name("target", target, TARGETS)
     for name in resolvers:
@@ -107,11 +100,11 @@ def digest() -> str:
 def _code(functions: dict[str, Any], target: str) -> tuple[Any, Any]:
     """Return an LLVM module with functions, made ahead or now, and the machine that it is for."""
     from hierarchy.jit import announce_compilation
-    from hierarchy.jit.caching import FOLDER, PROCESSOR, parts, suits
+    from hierarchy.jit.caching import PROCESSOR, Part, parts, suits
     from hierarchy.jit.exporting import lowered, stored
     from hierarchy.jit.linking import Machine, machine
 
-    module = stored(FOLDER / "solvers.bc", functions)
+    module = stored(Part.read("solvers"), functions)
     if module is None:
         announce_compilation()
         module = lowered(functions)
@@ -145,21 +138,6 @@ def _fix(module: Any, sizes: Sequence[int]) -> None:
     module.link_in(llvm.parse_assembly(str(chosen)))
 
 
-def _texts(texts: dict[str, str]) -> str:
-    """Return LLVM code of functions without arguments that return constant texts."""
-    from llvmlite import ir
-
-    module, byte = ir.Module("texts"), ir.IntType(8)
-    for name, text in texts.items():
-        content = ir.Constant(ir.ArrayType(byte, len(text) + 1), bytearray(text.encode() + b"\0"))
-        constant = ir.GlobalVariable(module, content.type, f"{name}_text")
-        constant.initializer, constant.global_constant = content, True
-        function = ir.Function(module, ir.FunctionType(byte.as_pointer(), []), name)
-        builder = ir.IRBuilder(function.append_basic_block())
-        builder.ret(builder.bitcast(constant, byte.as_pointer()))
-    return str(module)
-
-
 @final
 @dataclass(frozen=True)
 class Written:
@@ -177,19 +155,32 @@ class Written:
 
 def write(folder: Path, resolvers: Sequence[str] = RESOLVERS, target: str = "native",
           fix: Sequence[int] = ()) -> Written:
-    """Write the library into a folder that exists; see `emitted` for what is raised."""
-    made = emitted(resolvers, target, fix)
-    texts = {f"{place}/{name}": _filled(name, made, resolvers) for name, place in _PLACES.items()}
+    """Write the library into a folder that exists.
+
+    fix : sizes (n, m, levels) for which `hcod` has code of its own, see `fixed`.
+
+    Raises HierarchyError: an unknown or missing resolver or target, kernels are not compiled, or
+    this LLVM or this machine cannot make code for the target.
+    """
+    from solvers.library.entries import DEFAULTS
+
+    _check(resolvers, target, fix)
+    number, kernels = version(_PACKAGE), digest()
+    code, symbols, machine = _emitted(
+        resolvers, target, fix, {"th_version": number, "th_digest": kernels})
+    values = {"VERSION": number, "DIGEST": kernels, "MACHINE": machine, "DEFAULTS": ", ".join(
+        str(value).replace("inf", "INFINITY") for value in DEFAULTS)}
+    texts = {f"{place}/{name}": _filled(name, values, resolvers)
+             for name, place in _PLACES.items()}
     licence = distribution(_PACKAGE).read_text("licenses/LICENSE")  # None in a checkout
     texts["share/doc/task_hierarchy/LICENSE"] = licence or (
         Path(__file__).parents[2] / "LICENSE").read_text(encoding="utf-8")
     for name, text in texts.items():
         _room_for(folder / name).write_text(text, encoding="utf-8")
-    content = archive("kernels.o", made.content, made.symbols)
-    _room_for(folder / _ARCHIVE).write_bytes(content)
+    _room_for(folder / _ARCHIVE).write_bytes(_archive("kernels.o", code, symbols))
     why = _link(folder, target)
     names = (*texts, _ARCHIVE, *([] if why else [_SHARED]))
-    return Written(tuple(sorted(names)), made.machine, made.digest, why)
+    return Written(tuple(sorted(names)), machine, kernels, why)
 
 
 def differs(folder: Path) -> str:
@@ -215,18 +206,12 @@ def _room_for(file: Path) -> Path:
     return file
 
 
-def _filled(name: str, made: Emitted, resolvers: Sequence[str]) -> str:
+def _filled(name: str, values: dict[str, str], resolvers: Sequence[str]) -> str:
     """Return a template with its sections and values."""
-    from solvers.library.entries import DEFAULTS
-
-    defaults = ", ".join(str(value).replace("inf", "INFINITY") for value in DEFAULTS)
     text = (files("solvers.library") / "templates" / name).read_text(encoding="utf-8")
     text = re.sub(r"^@if (\w+)\n(.*?)^@end\n", lambda part: part[2] * (part[1] in resolvers), text,
                   flags=re.DOTALL | re.MULTILINE)
-    for mark, value in (("VERSION", version(_PACKAGE)), ("DIGEST", made.digest),
-                        ("MACHINE", made.machine), ("DEFAULTS", defaults)):
-        text = text.replace(f"@{mark}@", value)
-    return text
+    return re.sub(f"@({'|'.join(values)})@", lambda mark: values[mark[1]], text)
 
 
 def _link(folder: Path, target: str) -> str:
@@ -243,7 +228,7 @@ def _link(folder: Path, target: str) -> str:
     return "" if done.returncode == 0 else f"{compiler} failed: {lines[-1] if lines else ''}"
 
 
-def archive(name: str, content: bytes, symbols: Sequence[str]) -> bytes:
+def _archive(name: str, content: bytes, symbols: Sequence[str]) -> bytes:
     """Return a static library of one object, in which a linker finds these symbols.
 
     Its format is that of `ar` with a symbol table, as GNU and LLVM tools read it. The same object

@@ -6,13 +6,14 @@ import shlex
 import shutil
 import subprocess
 import sys
-from hashlib import sha256
 from pathlib import Path
+from zipfile import ZipFile
 
 import numba
 import pytest
 
-from hierarchy.jit.caching import FOLDER, Part, parts, read_code
+from hierarchy.jit import caching
+from hierarchy.jit.caching import Part, parts
 from hierarchy.jit.inside import llvm
 from scenarios.ahead.building import PARTS, is_current
 
@@ -98,7 +99,7 @@ def test_kernels_load_beside_arrays_of_gigabytes(tmp_path):
 
 @pytest.mark.parametrize("part", PARTS)
 def test_the_llvm_code_has_no_instruction_of_x86(part):
-    module = llvm.parse_bitcode(read_code(FOLDER / f"{part}.bc")[1])
+    module = llvm.parse_bitcode(Part.read(part).code("llvm"))
     assert not [one.name for one in module.functions if one.name.startswith("llvm.x86.")]
 
 
@@ -131,26 +132,30 @@ assert record_size(7, 2) > 0
 """
 
 
-def test_calls_that_are_listed_are_compiled_ahead_for_any_processor(tmp_path):
+def test_calls_that_are_listed_are_compiled_ahead_for_any_processor(tmp_path, monkeypatch):
     call = "solvers.kernels.merged.record_size(int64, int64)"
     (tmp_path / "calls.txt").write_text(f"{call}\n")
     (tmp_path / "cache" / "task-hierarchy").mkdir(parents=True)
     compiled(f"{FEW}sys.argv[1:] = ['solvers']{MAKE}", tmp_path)
-    made = (tmp_path / "objects" / "solvers.o").stat().st_mtime_ns
-    assert list(Part.read(tmp_path / "objects" / "solvers.o").entries) == [call]
-    for kept, settings in (("index", {}), ("o", {}), ("bc", {"TASK_HIERARCHY_NATIVE": "1"})):
+    file = tmp_path / "objects" / "solvers.kernels"
+    made, whole = file.stat().st_mtime_ns, file.read_bytes()
+    monkeypatch.setattr(caching, "FOLDER", file.parent)
+    part = Part.read("solvers")
+    assert list(part.entries) == [call]
+    for kept, settings in (
+            ("index", {}), ("machine", {}), ("llvm", {"TASK_HIERARCHY_NATIVE": "1"})):
         assert compiled(f"{FEW}{ASK}", tmp_path, **settings) == []
-        file = tmp_path / "objects" / f"solvers.{kept}"
-        whole = file.read_bytes()
-        damaged = whole[:-1] + bytes([whole[-1] ^ 1])  # it crashed, or answered wrongly
-        of_another_build = sha256(file.name.encode() + damaged[32:]).digest() + damaged[32:]
-        for other in damaged, of_another_build:
-            file.write_bytes(other)
-            assert len(compiled(f"{FEW}{ASK}", tmp_path, **settings)) == 1
-            shutil.rmtree(tmp_path / "cache")
+        with ZipFile(file) as archive:
+            content = archive.read(kept)
+        damaged = content[:-1] + bytes([content[-1] ^ 1])  # it crashed, or answered wrongly
+        file.write_bytes(whole.replace(content, damaged))
+        assert len(compiled(f"{FEW}{ASK}", tmp_path, **settings)) == 1
+        shutil.rmtree(tmp_path / "cache")
         file.write_bytes(whole)
     compiled(f"{FEW}sys.argv[1:] = ['record']{MAKE}", tmp_path)
-    assert (tmp_path / "objects" / "solvers.o").stat().st_mtime_ns > made
+    with pytest.raises(RuntimeError, match="of another build"):
+        part.code("machine")
+    assert file.stat().st_mtime_ns > made
     assert not (tmp_path / "calls.txt").read_text()
 
 

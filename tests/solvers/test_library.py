@@ -80,7 +80,7 @@ def test_warm_sequences_give_the_same_bits(library, name):
 def test_without_code_made_ahead_it_is_compiled_to_the_same_bits(tmp_path, monkeypatch):
     """As where a newer LLVM wrote it."""
     monkeypatch.setattr(caching, "FOLDER", tmp_path)
-    (tmp_path / "solvers.bc").write_bytes(source_digest(can_open).encode() + b"of another LLVM")
+    caching.write_part("solvers", ("", source_digest(can_open), {}, ()), llvm=b"of another LLVM")
     write(tmp_path, ("recursive",))
     for h in hierarchies(5):
         c.check_same(c.Library(tmp_path), ("recursive", {}, {}), h)

@@ -9,7 +9,7 @@ from numpy.polynomial import Polynomial
 
 from hierarchy.problem import Array
 from hierarchy.robots.found import Coupled, Loop
-from hierarchy.robots.mjcf.model import Built, add_frame, address, armature, joint_actuators, pose
+from hierarchy.robots.mjcf.model import Built, add_frame, joint_actuators, pose
 from hierarchy.robots.mjcf.part import WORLD, Compiled, Part, disabled, name_of
 from hierarchy.words import each, listed, some
 
@@ -43,7 +43,8 @@ def effort_limits(built: Built) -> Iterator[str]:
     mj, efforts = file.model, np.full(model.nv, np.inf)
     acts = not disabled(mj, "actuation")
     ranges: dict[int, list[Array]] = defaultdict(list)
-    for i, j, gear in joint_actuators(mj):
+    known = list(joint_actuators(mj))
+    for i, j, gear in known:
         group = int(mj.actuator_group[i])
         if gear and acts and not (group >= 0 and mj.opt.disableactuator >> group & 1):
             ranges[j].append(np.sort(gear * _force(mj, i)))
@@ -60,8 +61,8 @@ def effort_limits(built: Built) -> Iterator[str]:
             f"{file.joints[j]} ({total[0]:g} to {total[1]:g})"]
         efforts[joint.idx_v] = least
     model.effortLimit = efforts
-    known = {i for i, _, _ in joint_actuators(mj)}
-    others = [name_of(mj, "actuator", i) for i in range(len(mj.actuator_trnid)) if i not in known]
+    others = [name_of(mj, "actuator", i)
+              for i in sorted({*range(mj.nactuator)} - {i for i, _, _ in known})]
     yield from each(
         ("no actuator moves the joint, and nothing limits its effort here", idle if mj.nu else []),
         ("effort limits that differ by sign; the smaller counts both ways, and one of a single "
@@ -75,7 +76,7 @@ def _force(mj: Any, i: int) -> Array:
     force = np.array(mj.actuator_forcerange[i]) if mj.actuator_forcelimited[i] else _FREE
     if mj.actuator_gaintype[i] or mj.actuator_biastype[i]:  # no motor: fixed gain, no bias
         return force
-    control, k = _FREE, address(mj, "ctrl", i)
+    control, k = _FREE, mj.actuator_ctrladr[i]
     clamps = mj.actuator_ctrllimited[k] and not disabled(mj, "clampctrl")
     if mj.actuator_dyntype[i] != _INTEGRATOR and clamps:
         control = mj.actuator_ctrlrange[k]
@@ -90,7 +91,7 @@ _INTEGRATOR = 1  # mjDYN_INTEGRATOR: control is a rate of the activation
 
 _PASSIVE = {"stiffness": ("jnt_stiffness", "jnt_stiffnesspoly"), "friction": ("dof_frictionloss",),
             "damping": ("dof_damping", "dof_dampingpoly", "actuator_damping",
-                        "actuator_dampingpoly")}  # older MuJoCo has not all
+                        "actuator_dampingpoly")}
 
 
 def left_out(built: Built) -> Iterator[str]:
@@ -112,7 +113,7 @@ def left_out(built: Built) -> Iterator[str]:
             file.joints[j] for j, joint in built.pairs()
             if file.kind(j) == "free" and built.model.armature[joint.idx_v]]))
     if found := [what for what, names in _PASSIVE.items()
-                 if any(np.any(getattr(mj, name, 0.0)) for name in names)]:
+                 if any(np.any(getattr(mj, name)) for name in names)]:
         yield f"{listed(found)} of joints: not in the equations of motion"
     if mj.opt.density or mj.opt.viscosity:
         yield "drag of the air or fluid around: not in the equations of motion"
@@ -124,15 +125,14 @@ def refuse(file: Compiled) -> None:
     if negative := [name for name, v in zip(file.joints, mj.jnt_dofadr, strict=True)
                     if mj.dof_armature[v] < 0.0]:
         raise file.error(f"the armature of {some(negative)} is negative")
-    drives = armature(mj, "actuator", len(mj.actuator_trnid))
     on_joint = {i for i, _, _ in joint_actuators(mj)}
-    heavy = [f"tendon {name_of(mj, 'tendon', i)!r}" for i in range(mj.ntendon)
-             if armature(mj, "tendon", mj.ntendon)[i]]
-    heavy += [f"actuator {name_of(mj, 'actuator', i)!r}" for i in range(len(drives))
-              if i not in on_joint and drives[i]]
-    if heavy:
+    several = [(kind, int(i)) for kind, inertia in (
+        ("tendon", mj.tendon_armature), ("actuator", mj.actuator_armature))
+        for i in np.flatnonzero(inertia) if kind == "tendon" or i not in on_joint]
+    if several:
         raise file.error("an armature acts on several joints, which a robot here cannot have: "
-                         f"{some(heavy)}; give it to the joints")
+                         f"{some([f'{kind} {name_of(mj, kind, i)!r}' for kind, i in several])}; "
+                         "give it to the joints")
 
 
 _CONNECT, _WELD, _JOINT, _TENDON = 0, 1, 2, 3  # mjtEq

@@ -13,10 +13,10 @@ from typing import Any
 import numpy as np
 
 from hierarchy.problem import Array
-from hierarchy.robots.from_table import ROOT
+from hierarchy.robots.from_table import add_joint, empty
 from hierarchy.robots.joints import check_size
 from hierarchy.robots.library import pin
-from hierarchy.robots.mjcf.part import SIZES, WORLD, Part, disabled, rolled
+from hierarchy.robots.mjcf.part import WORLD, Part, disabled
 
 
 @dataclass(frozen=True)
@@ -24,7 +24,9 @@ class Built:
     """A `model` of pinocchio, its part of the file, and what became of joints, bodies and sites.
 
     `joints` has the index here of each joint of MuJoCo that moves, `placed` the joint here and the
-    place on it of each body of MuJoCo; `bodies` and `sites` have their frames by index.
+    place on it of each body of MuJoCo; `bodies` and `sites` have their frames by index. `qpos` and
+    `dofs` are the indices in MuJoCo of the last entries of q and of v, all but those of the base
+    that it has not.
     """
 
     part: Part
@@ -33,6 +35,8 @@ class Built:
     placed: list[tuple[int, Any]] = field(default_factory=list)
     bodies: dict[int, str] = field(default_factory=dict)
     sites: dict[int, str] = field(default_factory=dict)
+    qpos: list[int] = field(default_factory=list)
+    dofs: list[int] = field(default_factory=list)
 
     def pairs(self) -> Iterator[tuple[int, Any]]:
         """Yield each joint that moves: its index in MuJoCo, and the joint of pinocchio."""
@@ -42,14 +46,11 @@ class Built:
 
 def build(part: Part) -> Built:
     """Build the model: joints, inertias, armature, gravity and frames, but no limits."""
-    mj, built = part.compiled.model, Built(part, pin.Model())
-    built.model.name = str(part.compiled.file)
+    mj = part.compiled.model
+    built = Built(part, empty(part.compiled.file, "floating" if part.on_base else "fixed"))
     weight = 0.0 if disabled(mj, "gravity") else 1.0
     built.model.gravity.linear = weight * np.array(mj.opt.gravity)
-    base = 0
-    if part.on_base:
-        base = _add(built.model, 0, pin.JointModelFreeFlyer(), pin.SE3.Identity(), ROOT)
-    built.placed.append((base, pin.SE3.Identity()))
+    built.placed.append((built.model.njoints - 1, pin.SE3.Identity()))
     for body in range(1, mj.nbody):
         _place(built, body)
     for body in sorted(part.bodies):
@@ -80,25 +81,22 @@ def _place(built: Built, body: int) -> None:
     for j in range(first, first + mj.body_jntnum[body]):
         kind, axis = part.compiled.kind(j), np.array(mj.jnt_axis[j])
         at = pin.SE3(np.eye(3), np.array(mj.jnt_pos[j]))
-        here = mj.jnt_qposadr[j]
+        places = part.compiled.places(j)
         if kind == "free":  # its position is that of the body in the world
             at = place = pin.SE3.Identity()
         if j in part.joints:
-            reference = _motion(kind, axis, -mj.qpos0[here:here + 1]) if kind in _ALONG else (
-                pin.SE3.Identity())
-            joint = _MODELS[kind](*([axis] if kind in _ALONG else []))
-            parent = built.joints[j] = _add(built.model, parent, joint, place * at * reference,
-                                            part.compiled.joints[j])
+            along = kind in ("slide", "hinge")
+            reference = _motion(kind, axis, -mj.qpos0[places]) if along else pin.SE3.Identity()
+            joint = _MODELS[kind](*([axis] if along else []))
+            parent = built.joints[j] = add_joint(
+                built.model, parent, joint, place * at * reference, part.compiled.joints[j])
             place = at.inverse()
+            built.qpos.extend(places)
+            built.dofs.extend(mj.jnt_dofadr[j] + np.arange(joint.nv))
         else:
-            q = part.held[here:here + sum(SIZES[kind])]
-            if kind in _ALONG:
-                q = q - mj.qpos0[here]
+            q = part.held[places] - mj.qpos0[places] * (len(places) == 1)
             place = place * at * _motion(kind, axis, q) * at.inverse()
     built.placed.append((parent, place))
-
-
-_ALONG = ("slide", "hinge")
 
 
 _MODELS = {"slide": pin.JointModelPrismaticUnaligned, "hinge": pin.JointModelRevoluteUnaligned,
@@ -106,11 +104,9 @@ _MODELS = {"slide": pin.JointModelPrismaticUnaligned, "hinge": pin.JointModelRev
 
 
 def _motion(kind: str, axis: Array, q: Array) -> Any:
-    """Return how a joint of MuJoCo at q moves its body."""
-    if kind == "free":
-        return pose(q[:3], q[3:])
-    if kind == "ball":
-        return pose(np.zeros(3), q)
+    """Return how a joint at q, in our order, moves its body."""
+    if len(q) > 1:
+        return pose(q[:3] if kind == "free" else np.zeros(3), np.roll(q[-4:], 1))
     if kind == "slide":
         return pin.SE3(np.eye(3), axis * q[0])
     return pin.SE3(pin.AngleAxis(float(q[0]), axis).toRotationMatrix(), np.zeros(3))
@@ -120,12 +116,6 @@ def pose(position: Array, quaternion: Array) -> Any:
     """Return a placement with a quaternion w, x, y, z of MuJoCo."""
     w, x, y, z = quaternion / np.linalg.norm(quaternion)
     return pin.SE3(pin.Quaternion(w, x, y, z).toRotationMatrix(), np.array(position))
-
-
-def _add(model: Any, parent: int, joint: Any, place: Any, name: str) -> int:
-    index = int(model.addJoint(parent, joint, place, name))
-    model.addJointFrame(index, -1)
-    return index
 
 
 def add_frame(model: Any, name: str, joint: int, place: Any, kind: str) -> str:
@@ -148,31 +138,17 @@ def _set_armature(built: Built) -> None:
     mj = built.part.compiled.model
     inertia = np.array(mj.dof_armature)
     for i, j, gear in joint_actuators(mj):
-        inertia[mj.jnt_dofadr[j]] += gear**2 * armature(mj, "actuator", len(mj.actuator_trnid))[i]
-    total = np.array(built.model.armature)
-    for j, joint in built.pairs():
-        here = mj.jnt_dofadr[j]
-        total[joint.idx_v:joint.idx_v + joint.nv] = inertia[here:here + joint.nv]
-    built.model.armature = total
-
-
-def armature(mj: Any, kind: str, count: int) -> Array:
-    """Return the armature of each tendon or actuator; older MuJoCo has none."""
-    return np.asarray(getattr(mj, f"{kind}_armature", np.zeros(count)))
+        inertia[mj.jnt_dofadr[j]] += gear**2 * mj.actuator_armature[i]
+    base = np.zeros(built.model.nv - len(built.dofs))
+    built.model.armature = np.concatenate([base, inertia[built.dofs]])
 
 
 def joint_actuators(mj: Any) -> Iterator[tuple[int, int, float]]:
     """Yield the index, the joint and the gear of each actuator that moves one hinge or slide."""
-    for i in range(len(mj.actuator_trnid)):
+    for i in range(mj.nactuator):
         j = int(mj.actuator_trnid[i, 0])
         if mj.actuator_trntype[i] in _ON_JOINT and mj.jnt_type[j] in _SCALAR:
-            yield i, j, float(mj.actuator_gear[address(mj, "out", i), 0])
-
-
-def address(mj: Any, what: str, i: int) -> int:
-    """Return the index of the first "ctrl" or "out" of an actuator; in older MuJoCo it has one."""
-    addresses = getattr(mj, f"actuator_{what}adr", None)
-    return i if addresses is None else int(addresses[i])
+            yield i, j, float(mj.actuator_gear[mj.actuator_outadr[i], 0])
 
 
 _ON_JOINT = (0, 1)  # mjTRN_JOINT, mjTRN_JOINTINPARENT
@@ -181,11 +157,8 @@ _SCALAR = (2, 3)    # mjJNT_SLIDE, mjJNT_HINGE
 
 def configuration(built: Built, qpos: Array) -> Array:
     """Return q (nq,) for a qpos (nq,) of MuJoCo, its quaternions made unit length."""
-    mj, q = built.part.compiled.model, np.array(pin.neutral(built.model))
-    for j, joint in built.pairs():
-        here = mj.jnt_qposadr[j]
-        q[joint.idx_q:joint.idx_q + joint.nq] = rolled(qpos[here:here + joint.nq], -1)
-    return np.asarray(pin.normalize(built.model, q))
+    base = pin.neutral(built.model)[:built.model.nq - len(built.qpos)]
+    return np.asarray(pin.normalize(built.model, np.concatenate([base, qpos[built.qpos]])))
 
 
 _SAME = 1e-9       # relative to the robot's size, and to the inertias of the two joints of an entry
@@ -204,42 +177,34 @@ def compare(built: Built) -> None:
     steps = np.random.default_rng(0).uniform(-_REACH, _REACH, (_SAMPLES, model.nv))
     if built.part.on_base:  # which MuJoCo has not
         steps[:, :6] = 0.0
+    index = {frame.name: i for i, frame in enumerate(model.frames)}
     for step in (np.zeros(model.nv), *steps):
         q = np.asarray(pin.integrate(model, configuration(built, mj.qpos0), step))
         data.qpos[:] = built.part.held
-        for j, joint in built.pairs():
-            here = mj.jnt_qposadr[j]
-            data.qpos[here:here + joint.nq] = rolled(q[joint.idx_q:joint.idx_q + joint.nq], 1)
+        data.qpos[built.qpos] = q[model.nq - len(built.qpos):]
         for stage in ("mj_kinematics", "mj_comPos", "mj_tendon", "mj_transmission", "mj_makeM"):
             getattr(mujoco, stage)(mj, data)
         pin.framesForwardKinematics(model, own, q)
-        for what, found, expected in (
-                *_frames(built, own, "body", built.bodies, data.xpos, data.xmat),
-                *_frames(built, own, "site", built.sites, data.site_xpos, data.site_xmat)):
-            off = np.abs(found - expected).max()
-            if not off <= _SAME * max(1.0, np.abs(expected).max()):
+        for what, found, position, rotation in (
+                *((f"body {name!r}", own.oMf[index[name]], data.xpos[i], data.xmat[i])
+                  for i, name in built.bodies.items()),
+                *((f"site {name!r}", own.oMf[index[name]], data.site_xpos[i], data.site_xmat[i])
+                  for i, name in built.sites.items())):
+            off = np.abs([*(found.translation - position), *(found.rotation.ravel() - rotation)]
+                         ).max()
+            if not off <= _SAME * max(1.0, np.abs(position).max()):
                 raise file.error(f"{what} is {off:.2g} from where MuJoCo has it")
         _compare_inertia(built, q, pin.crba(model, own, q), data, mujoco.mj_mulM)
 
 
-def _frames(built: Built, own: Any, kind: str, frames: dict[int, str], positions: Array,
-            rotations: Array) -> Iterator[tuple[str, Array, Array]]:
-    index = {frame.name: i for i, frame in enumerate(built.model.frames)}
-    for i, name in frames.items():
-        found = own.oMf[index[name]]
-        yield (f"{kind} {name!r}", np.column_stack([found.translation, found.rotation]),
-               np.column_stack([positions[i], rotations[i].reshape(3, 3)]))
-
-
 def _compare_inertia(built: Built, q: Array, M: Array, data: Any, times: Any) -> None:
     """Compare the rows and columns of the joints that both have."""
-    file, columns = built.part.compiled, np.zeros((built.model.nv, built.part.compiled.model.nv))
-    for j, joint in built.pairs():
-        here, there = slice(joint.idx_v, joint.idx_v + joint.nv), file.model.jnt_dofadr[j]
-        columns[here, there:there + joint.nv] = np.eye(joint.nv)
-        if file.kind(j) == "free":  # its linear velocity is in the body's frame here
-            turn = pin.Quaternion(q[joint.idx_q + 3:joint.idx_q + 7]).toRotationMatrix()
-            columns[here, there:there + 3][:3] = turn.T
+    file, nv = built.part.compiled, built.model.nv
+    columns = np.zeros((nv, file.model.nv))
+    columns[np.arange(nv - len(built.dofs), nv), built.dofs] = 1.0
+    if 0 < len(built.dofs) == nv and file.kind(next(iter(built.joints))) == "free":
+        # Only the first joint can be free; its linear velocity is in the body's frame here.
+        columns[:3, built.dofs[:3]] = pin.Quaternion(q[3:7]).toRotationMatrix().T
     products = np.zeros_like(columns)
     for row, product in zip(columns, products, strict=True):
         times(file.model, data, product, row)
@@ -248,7 +213,6 @@ def _compare_inertia(built: Built, q: Array, M: Array, data: Any, times: Any) ->
     own = np.sqrt(np.diag(M)[both])
     allowed = _SAME * np.outer(own, own) + _ROUNDING * np.abs(M).max(initial=0.0)
     for row, column in np.argwhere(~(off <= allowed)):
-        v = np.flatnonzero(both)[column]
-        j = next(j for j, joint in built.pairs() if joint.idx_v <= v < joint.idx_v + joint.nv)
-        raise file.error(f"the inertia at body {file.bodies[file.model.jnt_bodyid[j]]!r} is "
+        dof = np.flatnonzero(columns[both][column])[0]
+        raise file.error(f"the inertia at body {file.bodies[file.model.dof_bodyid[dof]]!r} is "
                          f"{off[row, column]:.2g} from what MuJoCo has")

@@ -18,6 +18,7 @@ from hierarchy.robots.table import Base
 from hierarchy.words import each
 
 KINDS = ("free", "ball", "slide", "hinge")  # as MuJoCo numbers the types of joints
+_PLACES = {"free": (0, 1, 2, 4, 5, 6, 3), "ball": (1, 2, 3, 0), "slide": (0,), "hinge": (0,)}
 WORLD = 0                                   # index of the body that does not move
 _REMEDY = "pip install 'task-hierarchy[sim]'"
 
@@ -40,6 +41,10 @@ class Compiled:
     def kind(self, joint: int) -> str:
         """Return "free", "ball", "slide" or "hinge"."""
         return KINDS[self.model.jnt_type[joint]]
+
+    def places(self, joint: int) -> list[int]:
+        """Return where in qpos our coordinates of a joint are: quaternions are w, x, y, z there."""
+        return [int(self.model.jnt_qposadr[joint]) + i for i in _PLACES[self.kind(joint)]]
 
     def error(self, said: str) -> RobotError:
         """Return an error that names the file."""
@@ -231,26 +236,14 @@ def _lock(file: Compiled, joints: Sequence[int], held: Array, name: str,
     names = [file.joints[j] for j in joints]
     check_name("joint", name, names)
     j = joints[names.index(name)]
-    sizes = SIZES[file.kind(j)]
-    q, here = np.zeros(sum(sizes)), file.model.jnt_qposadr[j]
-    own = [JointPart(j, sum(sizes[:i]), 0, size) for i, size in enumerate(sizes)]
+    places = file.places(j)
+    q, single = np.zeros(len(places)), len(places) % 4  # then, of the others, a quaternion
+    own = [JointPart(j, i, 0, 1) for i in range(single)] + [
+        JointPart(j, single, 0, 4)] * (len(places) // 4)
     with naming(f"robot file {file.file!r}: locked", RobotError):
         set_joint(own, q, j, name, value)
-    held[here:here + len(q)] = rolled(q, 1)
+    held[places] = q
     return j
-
-
-SIZES = {"free": (1, 1, 1, 4), "ball": (4,), "slide": (1,), "hinge": (1,)}  # see joints.Part
-
-
-def rolled(coordinates: Array, by: int) -> Array:
-    """Return coordinates of a joint with its quaternion, if it has one, rolled by `by` entries.
-
-    MuJoCo's are w, x, y, z, ours x, y, z, w: by 1 for MuJoCo, by -1 from it.
-    """
-    turned = np.array(coordinates)
-    turned[-4:] = np.roll(turned[-4:], by)
-    return turned
 
 
 def _check_floating(file: Compiled, joints: Sequence[int]) -> None:
@@ -260,7 +253,7 @@ def _check_floating(file: Compiled, joints: Sequence[int]) -> None:
         if file.kind(j) == "free":
             trees = [file.bodies[top] for top in dict.fromkeys(
                 int(model.body_rootid[model.jnt_bodyid[i]]) for i in joints)]
-            raise RobotError(
-                f"robot file {file.file!r}: body {file.bodies[model.jnt_bodyid[j]]!r} floats, and "
-                "is not the first body with joints; only one robot can float. Choose with root = "
-                f"one of {', '.join(trees)}, or hold it with base = \"fixed\"")
+            raise file.error(
+                f"body {file.bodies[model.jnt_bodyid[j]]!r} floats, and is not the first body with "
+                "joints; only one robot can float. Choose with root = one of "
+                f"{', '.join(trees)}, or hold it with base = \"fixed\"")
