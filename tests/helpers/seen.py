@@ -24,9 +24,10 @@ from pathlib import Path
 from types import SimpleNamespace
 from unittest.mock import patch
 
+import computed
+import computed_runs
 import numpy as np
 import typer.main
-from computed import COMPUTED
 from matplotlib.colors import to_hex
 from matplotlib.ticker import ScalarFormatter
 from pinned import FOLDER, robot_facts
@@ -56,6 +57,7 @@ from solvers.problems import Recipe, bounded, generate, structured
 from solvers.qp import backends
 
 ROOT = FOLDER.parents[2]
+COMPUTED = computed.COMPUTED | computed_runs.COMPUTED
 ROBOTS = [*sorted((FOLDER.parent / "robots").glob("*.xml")),
           *sorted((ROOT / "examples" / "robots").iterdir())]
 GROUPS = {file.stem: file.read_text(encoding="utf-8").splitlines()
