@@ -2,22 +2,35 @@
 
 from dataclasses import astuple, replace
 from types import SimpleNamespace
-from unittest.mock import patch
+from unittest.mock import Mock, patch
 
 import numpy as np
 from hand_made import asked, recording
 
-from hierarchy import Hierarchy
+from hierarchy import Hierarchy, HierarchyError
 from scenarios import load
+from scenarios.config.distributions import flat
+from scenarios.config.resolvers import default_resolvers
+from scenarios.config.validation import _table
+from scenarios.draw.figures import drawing, letter
+from scenarios.loop.audit import ActiveSets
 from scenarios.measure.causes import Tick, causes
 from scenarios.measure.goals import Goal, goals, percent
 from scenarios.measure.happenings import happened
 from scenarios.measure.metrics import Metric, as_plain_data, measure
-from scenarios.measure.runs import Run
+from scenarios.measure.motions import motions, partings
+from scenarios.measure.runs import Run, table
 from scenarios.measure.statistics import best, paired, wilson
 from scenarios.measure.verdict import Verdict, lines, verdicts
 from scenarios.recording import listed
-from solvers import make
+from scenarios.recording.facts import _plain
+from scenarios.recording.fate import levels_at, row_units
+from scenarios.results import page, sampled_page
+from scenarios.results.columns import Results, verdict
+from scenarios.results.plan import Job
+from scenarios.scene.drawn import scene
+from solvers import Resolution, Status, make
+from solvers.qp import backends
 
 
 def signals():
@@ -131,4 +144,131 @@ def answers():
         (met, met._replace(x=np.array([-0.9, 0.0]))))]  # not what the resolver gives
 
 
-COMPUTED = {"signals": signals, "told": told, "statistics": statistics, "causes": answers}
+def parted():
+    """How far runs of strict resolvers are apart, where they part, and why."""
+    def run(spec, by=0.0, tick=1, units=("rad",) * 7, **changed):
+        scenario, q = asked(spec), np.zeros((5, 7))
+        q[tick:, 2] = by
+        one = recording(scenario, q=q, **changed)
+        robot = replace(one.facts.robot, velocity_units=units)
+        return Run(scenario, spec, spec, replace(one, facts=replace(one.facts, robot=robot)))
+
+    unsolved, slides = 3 * np.eye(5, dtype=int), (("m",) * 7, ("rad", *("m",) * 6))
+    (one,) = motions([run("recursive"), run("hqp", 5e-6), run("hcod", 2e-6)])
+    pairs = [(run("recursive"), other) for other in (
+        run("hqp", 5e-7), run("hqp", 1e-3, 3), run("hqp", 1e-3, 3, status=unsolved[3]),
+        run("hqp", 1e-3, 3, status=unsolved[4]), run("hqp", np.nan, 2),
+        run("hqp", 1e-3, 3, order=np.array([0, 1, 0, 0, 0])))]
+    pairs += [(run("recursive", units=units), run("hqp", 1e-3, 3, units)) for units in slides]
+    return [[*one.labels, one.apart], *(
+        [str(found), found.largest] for pair in pairs for found in partings(pair))]
+
+
+def sampled():
+    """Verdicts, shares and axes of samples, also of runs that stopped early."""
+    def results(labels, reasons, **columns):
+        jobs = tuple(Job("", "", "", sample=i, label=label) for label in labels
+                     for i in range(len(reasons) // len(labels)))
+        return Results(jobs, reasons, {name: Metric(name, name, 1.0, "rad/s") for name in columns},
+                       columns)
+
+    def speeds(values, by, stopped=0):
+        return results("ab", (None,) * (2 * len(values) - stopped) + ("fell",) * stopped,
+                       speed_max=np.r_[values, by * values])
+
+    many, few = np.linspace(1.0, 2.0, 16), np.linspace(1.0, 2.0, 6)
+    runs = [*(speeds(many, by, stopped) for by, stopped in (
+        (1.0, 0), (1.0, 3), (np.nan, 16), (0.1, 0), (0.1, 3), (0.1, 16), (2.0, 3))),
+        speeds(few, 2.0), results("ab", (None,) * 12, **dict.fromkeys(  # p = 0.031, but of two
+            ("speed_max", "acceleration_max"), np.r_[few, 2.0 * few]))]
+    kept = [results(["tpm"], (None, None, end), body_below_share=np.array([0.0, 0.5, 1.0]),
+                    joint_limit_excess=np.full(3, np.nan)) for end in (None, "broke")]
+    far = results("a", (None,) * 101, margin=np.append(np.linspace(-100.0, -99.0, 100), 50.0))
+    near, ends = np.linspace(10.0, 11.0, 100), np.r_[np.zeros(20), np.ones(20)]
+    axes = [np.append(near, beyond) for beyond in (12.0, 13.0, 30.0)]
+    axes += [-axes[1], *(np.r_[-2.0 - by, ends, 3.0 + by] for by in (0.0, 0.01)),
+             *(np.r_[np.full(99, 8.0), beyond] for beyond in (20.0, 25.0)),  # twice as large these
+             np.full(9, -8.0), np.zeros(9)]
+    return {"verdicts": ["\n".join([*verdict(one), str(one.paired("speed_max", "b"))])
+                         for one in runs], "kept": [str(one.shares()) for one in kept],
+            "beyond": [text.get_text() for text in sampled_page._spread(
+                far, far.metrics["margin"]).axes[0].texts],
+            "axes": [sampled_page._limits([values]) for values in axes]}
+
+
+def acting():
+    """Numbers of the sets of rows that hold a task back."""
+    def bounded(target):
+        return Hierarchy.from_levels([(np.eye(2), -np.ones(2), np.ones(2)), (np.eye(2), target)],
+                                     names=("box", "task"))
+
+    found = {}
+    for name in ("hcod", "tpm", "sns", "weighted"):
+        sets = ActiveSets()
+        found[name] = [sets.number(h, make(name).solve(h)) for h in map(bounded, (
+            (0, 0.5), (2, 0.5), (3, 0.5), (-2, 0.5), (-2, 5), (0.2, 0.1)))]
+    sets, h, hcod = ActiveSets(), bounded((2.0, 0.5)), make("hcod")
+    more, res = Hierarchy.from_levels([([[0.0, 1.0]], [0.5]), *h.levels()],
+                                      names=("more", *h.names)), hcod.solve(h)
+    unsure = Resolution(res.x, Status.ITERATION_LIMIT, active=res.active)
+    return found | {"ticks": [str(sets(k, SimpleNamespace(hierarchy=h, resolution=one)))
+                              for k, one in enumerate((Resolution(np.zeros(2)), res, unsure))],
+                    "a level more": [sets.number(more, hcod.solve(more))]}
+
+
+def shown():
+    """Tables, commands and replays of pages, units, frames."""
+    def made(spec="tpm-published", fault=None, **signals):
+        scenario = asked().with_resolver(spec)
+        return Run(scenario, spec, spec, recording(scenario, fault, **signals))
+
+    a, tasks = np.ones((5, 7)), [
+        {"kind": "look-at", "frame": "tool", "target": [1.0, 0.0, 0.0]},
+        {"kind": "pointing", "frame": "tool", "axis": [0.0, 0.0, 1.0], "alpha_d": 20.0}]
+    tables = [[made(minimal_distance=np.full(5, 0.2)), made("hqp")],
+              [made(a=1.005 * a), made("hqp", a=a), made("recursive", a=2.0 * a)],
+              [made(fault="diverged at tick 5"), made("hqp", a=a), made("recursive", a=2.0 * a)],
+              [replace(made(a=a), timing=recording(time_tick=np.full(5, 9e-6), a=2.0 * a))]]
+    for units in (("rad", "m"), ("rad or m", "rad or m"), ("rad", "rad or m")):
+        tables.append([made(), made()])
+        for run, unit in zip(tables[-1], units, strict=True):
+            vars(run)["metrics"] = {"excess": Metric("excess", "Beyond", 0.5, unit)}
+    changed = load("ellipse", ["control.duration=0.5", "pointing.alpha_d=35"])
+    with patch.object(page, "html", lambda *_, rate, **__: int(100 * rate) * "x"):
+        replays = [page.replay("a", motions([made()]), most).replace("x", "")
+                   for most in (3000, 2999, 1000, 100)]
+    with patch.object(page, "html", Mock(side_effect=HierarchyError("no frames"))):
+        replays.append(page.replay("a", motions([made()]), 3000))
+    away = np.where(np.arange(5)[:, None] > 2, np.nan, np.zeros(7))
+    resolvers = []
+    for missing in ("", "daqp"):
+        with patch.object(backends, "installed", lambda name, no=missing: name != no):
+            resolvers.append(str(default_resolvers()))
+    ax, around = drawing.figure(width=4.0, height=3.0)[1][0], []
+    for pixels in ([[50, 40], [70, 50]], [[20, 40], [80, 44]], [[2, 3], [4, 5]],  # high, wide
+                   [[190, 90], [199, 99]], [[-50, 0], [300, 300]]):  # in corners, beyond
+        letter._show_around(ax, np.array(pixels, dtype=float), 10.0, (100, 200))
+        around.append([*ax.get_xlim(), *ax.get_ylim()])
+    levels = [levels_at(recording(orders=orders, order=order), [0, 1, 4]) for orders, order in (
+        (("a", "a > b"), [0, 1, 1, 0, 0]), (("",), np.zeros(5, int)))]
+    return {"tables": [[f"{row.label} {row.unit} {row.cells}" for row in table(runs)]
+                       for runs in tables],
+            "commands": [page.run_command(Run(one.with_resolver(of), of, of), "runs/a")
+                         for one, of in ((changed, "hqp:backend=osqp"), (load("ellipse"), "hcod"))],
+            "replays": replays, "units": [str(row_units(*given, {})) for given in (
+                (load("ellipse-hqp", {"tasks": tasks, "pointing": None}), [
+                    "look-at", "pointing", "position"]), *(
+                    (load("wipe", {"tasks.0.target": [20.0] * n}), ["force"]) for n in (1, 3, 6)))],
+            "settings": [repr(_plain(value)) for value in (
+                1.5, None, (1, 2.0), np.inf, (1.0, np.inf), [1.0])],
+            "frames": [scene(recording(q=away, order=np.zeros(5, int)), rate).ticks
+                       for rate in (1.0, 1e15)],
+            "levels": [[*one.names, one.fate] for one in levels],
+            "around": around, "resolvers": resolvers, "flat": [str(flat(one)) for one in (
+                3, {"a": {"b": {"around": 1}}})],
+            "at a path": [str(_table({"a": 3, "b": [{"c": 1}]}, path)) for path in (
+                ["b", 0], ["a"], ["a", "d"], ["b", 1], [])]}
+
+
+COMPUTED = {"signals": signals, "told": told, "statistics": statistics, "causes": answers,
+            "parted": parted, "sampled": sampled, "acting": acting, "shown": shown}

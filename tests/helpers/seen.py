@@ -28,6 +28,7 @@ import computed
 import computed_runs
 import numpy as np
 import typer.main
+from hand_made import recording
 from matplotlib.colors import to_hex
 from matplotlib.ticker import ScalarFormatter
 from pinned import FOLDER, robot_facts
@@ -41,7 +42,7 @@ from scenarios.cli import doctor, runs, terminal
 from scenarios.cli.main import run_command
 from scenarios.config.distributions import Distribution
 from scenarios.draw import replay
-from scenarios.draw.figures import drawing, letter, palette
+from scenarios.draw.figures import drawing, letter, palette, picture, timeline
 from scenarios.draw.viewer import live, live_page
 from scenarios.loop import controller, faults
 from scenarios.measure import run_folder, safety
@@ -164,6 +165,29 @@ def seen_of_answers():
                             certify(h, res.x).certified,
                             str(explain(h, res, rows=rows if k % 2 else None))]]
     return found
+
+
+def seen_of_figures():
+    """Of figures of the letter, of runs by hand: pairs, one tick, names of joints as formulas."""
+    names = ("ellipse-35deg-equality", "ellipse", "ellipse-velocity", "ellipse-35deg", "ellipse-3d")
+    runs = [recording(load(name), v=np.full((5, 7), float(i)), active_control_point=np.full(5, 2))
+            for i, name in enumerate(names)]
+    speeds = letter.PANEL["joint-velocities"]
+    for name in ("_{}", r"${}\q$"):
+        run = recording()
+        robot = dataclasses.replace(run.facts.robot, velocity_names=[*map(name.format, range(7))])
+        runs.append(dataclasses.replace(run, facts=dataclasses.replace(run.facts, robot=robot)))
+    pushed = load("humanoid-reach", {"control.duration": 0.01})
+    pair = [simulate(pushed)]
+    pair.append(dataclasses.replace(pair[0], signals={
+        **pair[0].signals, "v": np.roll(pair[0]["v"], 9, axis=1)}))  # a joint has one colour
+    return {**{f"{len(of)} {name}": figure_facts(fig) for of in (
+                runs[:5], runs[2:3], [recording(t=[0.0, 1.0])], [recording(t=[0.0])])
+               for name, fig in letter.figures(of)}, "one tick": figure_facts(
+                   timeline.timeline(recording(t=[2.0]))), "joints": [
+                figure_facts(letter.stacked([(run, [speeds]) for run in of], ""))
+                for of in ([runs[5]], [runs[6]], pair)],
+            "nearest": picture._nearest(recording(minimal_distance=[2.0, np.nan, 1.0, 2.0, 2.0]))}
 
 
 SCENES = ((physics, physics.scene), (torque, torque.on_floor))
@@ -398,7 +422,8 @@ PARTS = {**{f"run {name}": partial(seen_of_run, name) for name in RUNS},
          "answers": seen_of_answers, "live page": partial(seen_of_live_page, "ellipse"),
          "live page of a cone": partial(seen_of_live_page, "ellipse", position=None,
                                         avoidance=None),
-         "keys": seen_of_keys, "problems": seen_of_problems, "robots": seen_of_robots}
+         "keys": seen_of_keys, "figures": seen_of_figures,
+         "problems": seen_of_problems, "robots": seen_of_robots}
 
 
 def seen(part):

@@ -4,7 +4,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from hand_made import recording as hand_made
 
 from scenarios import load, simulate
 from scenarios.cell.build import build
@@ -12,7 +11,7 @@ from scenarios.draw.replay import html
 from scenarios.draw.viewer.live import Live
 from scenarios.loop.controller import Controller
 from scenarios.measure.judging import judge
-from scenarios.recording.fate import Fate, levels_at, row_units
+from scenarios.recording.fate import Fate, levels_at
 from scenarios.recording.listed import errors
 from scenarios.scene.drawn import scene
 
@@ -54,21 +53,6 @@ def test_tasks_of_joints_have_their_unit_and_none_where_those_differ(units, all_
     assert {section.title: unit for section, unit, _ in errors(run)} == expected
 
 
-def test_a_cone_and_a_direction_have_no_unit():
-    """Their levels were said to be missed by so many m/s²."""
-    tasks = [{"kind": "look-at", "frame": "tool", "target": [1.0, 0.0, 0.0]},
-             {"kind": "pointing", "frame": "tool", "axis": [0.0, 0.0, 1.0], "alpha_d": 20.0}]
-    scenario = load("ellipse-hqp", {"tasks": tasks, "pointing": None})
-    names = ["look-at", "pointing", "position"]
-    assert row_units(scenario, names, {}) == ("", "", "m/s²")
-
-
-def test_a_wrench_has_no_unit():
-    for target, unit in (([20.0], "N"), ([20.0] * 3, "N"), ([20.0] * 6, "")):
-        scenario = load("wipe", {"tasks.0.target": target})
-        assert row_units(scenario, ["force"], {}) == (unit,)
-
-
 NAMES = ("ellipse", "ellipse-velocity", "ellipse-published", "ellipse-limits", "ellipse-hqp")
 
 
@@ -104,18 +88,3 @@ def test_distances_that_are_not_those_recorded_leave_levels_unknown(recording):
     levels = levels_at(other, [0, 700])
     assert (levels.fate == Fate.UNKNOWN).any(axis=1).all()
     assert np.isnan(levels.violation).all()
-
-
-@pytest.mark.parametrize("rate", [1.0, 1e15])
-def test_frames_end_where_the_state_stops_being_finite_and_are_no_more_than_ticks(rate):
-    q = np.zeros((5, 7))
-    q[3:] = np.nan
-    assert scene(hand_made(q=q, order=np.zeros(5, int)), rate).ticks.tolist() == [0, 1, 2]
-
-
-def test_levels_that_were_not_judged_are_unknown_where_they_are_in_the_stack():
-    levels = levels_at(hand_made(orders=("a", "a > b"), order=[0, 1, 1, 0, 0]), [0, 1, 4])
-    assert levels.names == ("a", "b")
-    assert levels.fate.tolist() == [[Fate.UNKNOWN, Fate.ABSENT], [Fate.UNKNOWN, Fate.UNKNOWN],
-                                    [Fate.UNKNOWN, Fate.ABSENT]]
-    assert levels_at(hand_made(orders=("",)), [0, 4]).fate.shape == (2, 0)  # nothing was stacked

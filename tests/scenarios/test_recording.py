@@ -23,7 +23,6 @@ from scenarios.measure import run_folder
 from scenarios.measure.metrics import Metric
 from scenarios.measure.motions import motions
 from scenarios.measure.runs import Run, table
-from scenarios.recording.facts import _plain
 from scenarios.recording.signals import Signal, known
 from scenarios.results.sections import multiples
 
@@ -51,13 +50,6 @@ def test_a_recording_without_ticks_is_drawn_empty():
     panels = recording(t=[]).plot().axes
     assert [len(ax.lines) for ax in panels] == [7, 7, 3, 1]
     assert not any(line.get_xdata().size for ax in panels for line in ax.lines)
-
-
-@pytest.mark.parametrize(("value", "kept"), [
-    (1.5, 1.5), (None, None), ((1, 2.0), (1, 2.0)), (np.inf, "inf"), ((1.0, np.inf), "(1.0, inf)"),
-    ([1.0], "[1.0]")])
-def test_a_setting_that_json_lacks_is_kept_as_text(value, kept):
-    assert _plain(value) == kept
 
 
 @pytest.mark.parametrize(("told", "said"), [("arm", "arm"), ("", "unknown processor")])
