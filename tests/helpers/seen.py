@@ -17,6 +17,7 @@ import os
 import re
 import shlex
 import tempfile
+import warnings
 import zipfile
 from functools import cache, partial
 from importlib.metadata import version
@@ -32,6 +33,7 @@ from hand_made import recording
 from matplotlib.colors import to_hex
 from matplotlib.ticker import ScalarFormatter
 from pinned import FOLDER, robot_facts
+from unplugged import unplugged
 
 from hierarchy import HierarchyError, Robot, Task, jit, plugins, tasks
 from scenarios import Scenario, load, load_run, shipped, simulate
@@ -246,7 +248,8 @@ def seen_of_commands(group):
     """Of the commands of a group: exit codes, what they print and write, figures, runs."""
     found, here = {}, Path.cwd()
     with (tempfile.TemporaryDirectory() as folder, patch.dict(os.environ, {"COLUMNS": "100"}),
-          steadily() as drawn):
+          steadily() as drawn, unplugged(), warnings.catch_warnings(record=True) as warned):
+        warnings.simplefilter("always", UserWarning)
         os.chdir(folder)
         try:
             for line in filter(None, GROUPS[group]):
@@ -255,7 +258,9 @@ def seen_of_commands(group):
                 with (contextlib.redirect_stdout(printed), contextlib.redirect_stderr(printed),
                       patch("sys.argv", ["hierarchy", *shlex.split(command)])):
                     code = run_command(shlex.split(command))
-                found[line] = [code, _cleaned(printed.getvalue())]
+                found[line] = [code, _cleaned(printed.getvalue()),
+                               *(str(one.message) for one in warned)]
+                warned.clear()
             found["written"] = {str(file): _written(file) for file in sorted(Path().rglob("*"))
                                 if "worst" not in file.parts}
         finally:
