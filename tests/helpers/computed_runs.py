@@ -5,15 +5,21 @@ from types import SimpleNamespace
 from unittest.mock import Mock, patch
 
 import numpy as np
+import pinocchio as pin
 from hand_made import asked, recording
 
 from hierarchy import Hierarchy, HierarchyError
 from scenarios import load
+from scenarios.cell.build import build
+from scenarios.cell.plants import torque
 from scenarios.config.distributions import flat
 from scenarios.config.resolvers import default_resolvers
 from scenarios.config.validation import _table
 from scenarios.draw.figures import drawing, letter
 from scenarios.loop.audit import ActiveSets
+from scenarios.loop.controller import Controller
+from scenarios.loop.footing import footing
+from scenarios.measure import safety
 from scenarios.measure.causes import Tick, causes
 from scenarios.measure.goals import Goal, goals, percent
 from scenarios.measure.happenings import happened
@@ -270,5 +276,59 @@ def shown():
                 ["b", 0], ["a"], ["a", "d"], ["b", 1], [])]}
 
 
+def standing():
+    """Which of runs of 5 s end at rest and upright, and how far a point is inside of corners."""
+    def run(fault=None, pushes=(), **changes):
+        t = np.arange(0.0, 5.0, 0.01)
+        scenario = SimpleNamespace(control=SimpleNamespace(duration=5.0),
+                                   plant=SimpleNamespace(pushes=pushes))
+        made = type("Run", (dict,), {"ticks": t.size, "fault": fault, "true": dict.get,
+                                     "scenario": scenario})
+        return made({"t": t, "v": np.zeros((500, 2)), "q": np.zeros((500, 2)),
+                     "com": np.tile([0.0, 0.0, 0.8], (500, 1)), "support_margin": np.full(500, 0.1),
+                     "joint_lower": np.full(2, -1.0), "joint_upper": np.full(2, 1.0), **changes})
+
+    def moving(tick):
+        return {"v": 0.3 * np.eye(500, 2, -tick) + 0.3 * np.eye(500, 2, 1 - tick)}
+
+    sunk, corners = np.tile([0.0, 0.0, 0.8], (500, 1)), np.array(
+        [(0.0, 0.0), (1.0, 1.0), (1.0, 0.0), (0.0, 1.0), (0.5, 0.2), (0.0, 0.0)])
+    sunk[1:, 2] = 0.7
+    runs = [run(), run(**moving(100)), run(**moving(400)), run(com=sunk), run("it has fallen"),
+            *(run(q=np.full((500, 2), q)) for q in (-1.1, -1.005, 1.005, 1.1)),
+            run(support_margin=np.full(500, np.nan)),
+            *(run(pushes=(SimpleNamespace(at=at, duration=0.25),)) for at in (2.75, 2.85))]
+    return {"stands": [str(safety.standing(one)) for one in runs], "inside": [
+        [torque.inside(corners[:count], np.array(at)) for count in (6, 2)]
+        for at in ((0.5, 0.5), (0.9, 0.4), (1.2, 0.5), (0.0, 0.3))]}
+
+
+def doubts():
+    """What a first tick says of changed robots whose run may fall, or prove nothing."""
+    def strong(robot):
+        robot.effort_limit[robot.actuated:] *= 1000.0
+
+    def without_limit(robot):
+        robot.effort_limit[robot.velocity_names.index("left_knee")] = np.inf
+
+    def thin(robot):
+        robot.model.inertias[robot.joint("left_knee")] = pin.Inertia(
+            3.0, np.zeros(3), np.diag([0.03, 0.01, 0.01]))
+
+    def floats(robot):
+        robot.model.gravity.linear = np.zeros(3)
+
+    left, found = {"frame": "left_foot", "x": [-0.05, 0.16], "y": [-0.04, 0.04]}, []
+    for change, of in ((without_limit, {}), (strong, {}), (thin, {}),
+                       (floats, {"contacts": [left]})):
+        cell = build(load("stand-push").with_changes(of))
+        change(cell.robot)
+        controller = Controller(cell.scenario, cell)
+        controller.command(0.0, cell.plant.q, cell.plant.v)
+        found.append(["\n".join(footing(controller))])
+    return found
+
+
 COMPUTED = {"signals": signals, "told": told, "statistics": statistics, "causes": answers,
-            "parted": parted, "sampled": sampled, "acting": acting, "shown": shown}
+            "parted": parted, "sampled": sampled, "acting": acting, "shown": shown,
+            "standing": standing, "doubts": doubts}

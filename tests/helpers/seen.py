@@ -69,7 +69,7 @@ GROUPS = {file.stem: file.read_text(encoding="utf-8").splitlines()
 RUNS = {"ellipse": 0.2, "ellipse-hqp": 0.2, "dual-arm": 0.1, "human-hqp": 0.1, "wipe": 0.05,
         "reach-torque-smooth": 0.02}
 PLAIN = ("run ellipse", "run ellipse-hqp", "run dual-arm", "keys", "problems", "commands plain",
-         *(f"computed {name}" for name in COMPUTED))
+         *(f"computed {name}" for name in COMPUTED if name != "doubts"))
 # What `hierarchy doctor` finds: names of modules of Python.
 REQUIRED = ("json>=2", "calendar>=9", "csv", "string<2", "none>=3", "wave; sys_platform=='no'",
             *(f"{name}; extra == '{extra}'" for name, extra in (

@@ -310,19 +310,6 @@ def test_frames_that_cannot_be_used_are_refused_by_name(tmp_path):
         refused(said, RecordedFrames, tmp_path, ROBOT)
 
 
-@pytest.mark.parametrize(("name", "kind"), [("human", "no_frames"), ("human-hqp", "dark_frames")])
-def test_a_blind_camera_leads_to_the_policy_for_stale_measurements(name, kind):
-    """Frames at 0, 1/30, 2/30 s, then none up to 0.4 s; blind is 0.1 s after the last."""
-    run = simulate(load(name, [*QUICK, "sensor.stale_after=0.1", "start.v=[0.1,0,0,0,0,0,0]",
-                               f"faults=[{{kind='{kind}', at=0.08, duration=0.32}}]"]))
-    assert run.fault is None
-    ticks = [event.tick for event in run.events if event.kind == "stale"]
-    assert ticks == list(range(ticks[0], 80))
-    assert ticks[0] in (35, 36)  # the last frame was taken in tick 14, at 0.07 s
-    assert np.abs(run["v"][79]).max() < 0.5 * np.abs(run["v"][ticks[0]]).max()
-    assert {event.action for event in run.events} == {"brake"}
-
-
 def test_an_obstacle_at_a_point_of_the_robot_is_refused_at_the_start():
     def exact(centre):
         return ExactDistances(ROBOT, Obstacles((Obstacle("point", centre),)))

@@ -1,7 +1,6 @@
 """A robot in MuJoCo with torque motors: its physics, and contacts before they are trusted."""
 
 from functools import partial
-from types import SimpleNamespace
 
 import numpy as np
 import pinocchio as pin
@@ -15,15 +14,12 @@ from urdf_text import INERTIAL, LIMIT, joint, link, urdf
 from hierarchy import Robot, State
 from hierarchy.contacts import Contacts
 from hierarchy.tasks import TorqueLimits
-from scenarios import load, simulate
+from scenarios import load
 from scenarios.cell.build import build
-from scenarios.cell.plants.torque import TorqueRobot, inside
+from scenarios.cell.plants.torque import TorqueRobot
 from scenarios.config import ScenarioError
 from scenarios.config.sections.plant import PushSection, TorqueSection
 from scenarios.loop.controller import Controller
-from scenarios.loop.footing import footing
-from scenarios.measure.metrics import measure
-from scenarios.measure.safety import standing
 
 pytestmark = pytest.mark.usefixtures("with_mujoco")
 
@@ -178,50 +174,6 @@ def test_torques_follow_with_the_bandwidth_of_the_motors():
                                                       rel=0.05)
 
 
-def recorded(fault=None, pushes=(), **changes):
-    """A run of 5 s in which a robot stands still, but for what is changed."""
-    t = np.arange(0.0, 5.0, 0.01)
-    run = type("Run", (dict,), {
-        "ticks": t.size, "fault": fault, "true": dict.get, "scenario": SimpleNamespace(
-            control=SimpleNamespace(duration=5.0), plant=SimpleNamespace(pushes=pushes))})
-    return run({"t": t, "v": np.zeros((t.size, 2)), "q": np.zeros((t.size, 2)),
-                "com": np.tile([0.0, 0.0, 0.8], (t.size, 1)),
-                "support_margin": np.full(t.size, 0.1), "joint_lower": np.full(2, -1.0),
-                "joint_upper": np.full(2, 1.0), **changes})
-
-
-def from_tick(tick, value, shape=(500, 2)):
-    values = np.zeros(shape)
-    values[tick:] = value
-    return values
-
-
-@pytest.mark.parametrize(("changes", "stands"), [
-    ({}, True), ({"v": from_tick(100, 0.3) - from_tick(101, 0.3)}, True),
-    ({"v": from_tick(400, 0.3) - from_tick(401, 0.3)}, False),
-    *(({"q": from_tick(0, sign * far)}, far < 1.01) for sign in (-1, 1) for far in (1.005, 1.1)),
-    ({"support_margin": from_tick(0, np.nan, 500)}, False),
-    ({"com": from_tick(0, [0.0, 0.0, 0.8], (500, 3)) - from_tick(1, [0, 0, 0.1], (500, 3))},
-     False), ({"fault": "the robot has fallen"}, False),
-    ({"pushes": (SimpleNamespace(at=2.75, duration=0.25),)}, True),
-    ({"pushes": (SimpleNamespace(at=2.9, duration=0.2),)}, None)])
-def test_a_robot_stands_only_at_rest_upright_and_within_its_limits_until_the_end(changes, stands):
-    assert standing(recorded(**changes)) is stands
-
-
-@pytest.mark.parametrize(("name", "keys"), [
-    ("wipe", {"plant.pushes": [{"joint": "joint_4", "force": 1e200, "direction": 0.0, "at": 2.003,
-                                "duration": 0.1}], "control.duration": 2.1}),
-    ("stand-push", {"plant.pushes": [{"joint": "trunk_pitch", "force": 1e200, "direction": 0.0,
-                                      "at": 0.012, "duration": 0.1}],
-                    "control.duration": 0.05, "control.period": 0.004})])
-def test_a_run_whose_simulation_breaks_is_measured_up_to_there(name, keys):
-    run = simulate(load(name, keys))
-    assert run.fault.startswith("the state is not finite")
-    assert np.isnan(run["floor_force"][-1]).any()
-    assert measure(run)["stack_changes"].value == 0.0
-
-
 def test_a_base_that_tilts_has_fallen():
     q, v = ROBOT.rest.copy(), np.zeros(ROBOT.n)
     q[2] += 100.0
@@ -247,56 +199,6 @@ def test_a_share_of_the_torques_limits_them_and_what_stays_the_same_is_kept():
     assert scenario.model_copy(update={"limits": None}).asks == "inequalities"
     seen = build(load("ellipse"))
     assert build(load("ellipse", ["position.gain=2.0"]), seen).sensor is seen.sensor
-
-
-@pytest.mark.parametrize(("place", "found"), [
-    ((0.5, 0.5), 0.5), ((0.9, 0.4), 0.1), ((1.2, 0.5), -0.2), ((0.0, 0.3), 0.0)])
-def test_the_margin_of_support_is_that_from_the_nearest_edge(place, found):
-    corners = np.array([(0.0, 0.0), (1.0, 1.0), (1.0, 0.0), (0.0, 1.0), (0.5, 0.2), (0.0, 0.0)])
-    assert inside(corners, np.array(place)) == pytest.approx(found)
-    assert np.isnan(inside(corners[:2], np.array(place)))
-
-
-def doubts(scenario, change):
-    """What a first tick says of a robot with contacts whose run may fall, or prove nothing."""
-    cell = build(scenario)
-    change(cell.robot)
-    controller = Controller(scenario, cell)
-    controller.command(0.0, cell.plant.q, cell.plant.v)
-    return list(footing(controller))
-
-
-def of_strong_drives(robot):
-    robot.effort_limit[robot.actuated:] *= 1000.0
-
-
-def of_a_thin_shank(robot):
-    knee = robot.joint("left_knee")
-    robot.model.inertias[knee] = pin.Inertia(3.0, np.zeros(3), np.diag([0.03, 0.01, 0.01]))
-
-
-def of_a_motor_without_limit(robot):
-    robot.effort_limit[robot.velocity_names.index("left_knee")] = np.inf
-
-
-LEFT = {"frame": "left_foot", "x": [-0.05, 0.16], "y": [-0.04, 0.04]}
-CASES = {
-    "no effort limit": (of_a_motor_without_limit, "does not limit left_knee"),
-    "effort limits that say nothing": (of_strong_drives, "it holds the robot, whatever"),
-    "an inertia that no body has": (of_a_thin_shank, "no body has the inertia that moves with "
-                                    "left_knee")}
-
-
-@pytest.mark.parametrize("case", CASES)
-def test_what_a_robot_lacks_that_may_make_a_run_fall_or_prove_nothing_is_said(case):
-    change, words = CASES[case]
-    assert words in " ".join(doubts(load("stand-push"), change))
-
-
-def test_without_gravity_nothing_has_to_stand():
-    scenario = load("stand-push").with_changes({"contacts": [LEFT]})
-    assert "stand" not in " ".join(doubts(
-        scenario, lambda robot: setattr(robot.model.gravity, "linear", np.zeros(3))))
 
 
 def test_a_robot_that_is_put_on_the_floor_is_carried_from_the_first_tick_on():
