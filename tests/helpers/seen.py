@@ -26,6 +26,7 @@ from types import SimpleNamespace
 from unittest.mock import patch
 
 import computed
+import computed_bench
 import computed_runs
 import numpy as np
 import typer.main
@@ -60,7 +61,7 @@ from solvers.problems import Recipe, bounded, generate, structured
 from solvers.qp import backends
 
 ROOT = FOLDER.parents[2]
-COMPUTED = computed.COMPUTED | computed_runs.COMPUTED
+COMPUTED = computed.COMPUTED | computed_runs.COMPUTED | computed_bench.COMPUTED
 ROBOTS = [*sorted((FOLDER.parent / "robots").glob("*.xml")),
           *sorted((ROOT / "examples" / "robots").iterdir())]
 GROUPS = {file.stem: file.read_text(encoding="utf-8").splitlines()
