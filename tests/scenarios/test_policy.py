@@ -1,6 +1,5 @@
 """What is sent in a tick with trouble, and from one stack to the next."""
 
-from functools import partial
 from itertools import islice, permutations
 
 import numpy as np
@@ -17,61 +16,17 @@ from scenarios.loop.controller import Controller
 from scenarios.loop.faults import Faults
 from scenarios.loop.policy import Policy
 from scenarios.loop.transition import Blend, Key
-from solvers import Status, make
+from solvers import make
 
 PERIOD = 0.001
 V = np.array([0.5, -1.0, 0.0])
 X = np.array([3.0, 1.0, -2.0])
-BRAKE = -10.0 * V
-bound = partial(np.clip, a_min=-1.5, a_max=1.5)
-
-
-def policy(level="acceleration", clamp=None, period=PERIOD, **section):
-    return Policy(ControlSection(policy=section, level=level, period=period, duration=1.0,
-                                 resolver="hcod"), clamp)
-
-
-# Settings; then tick by tick the troubles, the answer, what is sent, and what is said to be done.
-TWO = ["inaccurate", "overrun"]
-CASES = {
-    "no trouble": ({}, [([], X, X, [])]),
-    **{f"{kind} brakes": ({}, [([kind], X, BRAKE, ["brake"])]) for kind in (
-        *(status.name.lower() for status in Status if status is not Status.SOLVED), "not_finite",
-        "stale", "overrun", "inside")},
-    "at velocity level it stands still": (
-        {"level": "velocity"}, [(["stale"], X, 0 * X, ["brake"])]),
-    "held for as long as patience lasts": (
-        {"stale": "hold", "patience": 2}, [([], X, X, []), *[(["stale"], 9 * X, X, ["hold"])] * 2,
-                                           (["stale"], 9 * X, BRAKE, ["brake"])]),
-    "a good tick restores patience": (
-        {"stale": "hold", "patience": 1}, [([], X, X, []), (["stale"], 9 * X, X, ["hold"])] * 3),
-    "nothing to hold": ({"stale": "hold"}, [(["stale"], X, BRAKE, ["brake"])]),
-    "an answer in doubt may be used": ({"inaccurate": "use"}, [(["inaccurate"], X, X, ["use"])]),
-    "the graver of two: brake": ({"inaccurate": "brake", "overrun": "hold"},
-                                 [([], X, X, []), (TWO, X, BRAKE, ["brake"] * 2)]),
-    "the graver of two: stop": ({"inaccurate": "stop", "overrun": "brake"},
-                                [(TWO, X, -V / PERIOD, ["stop"] * 2)]),
-    "clamped to the limits": ({"clamp": bound}, [([], X, bound(X), ["clamp"]),
-                                                 ([], X / 3, X / 3, [])]),
-    "braking within the limits is no event of its own": (
-        {"clamp": bound}, [(["stale"], X, bound(BRAKE), ["brake"])]),
-    **{f"never {bad}": ({}, [([], np.array([0.0, bad, 0.0]), BRAKE, ["brake"])])
-       for bad in (np.nan, np.inf)}}
-
-
-@pytest.mark.parametrize("case", CASES)
-def test_what_is_sent_and_said(case):
-    section, ticks = CASES[case]
-    p = policy(**section)
-    for troubles, answer, sent, done in ticks:
-        np.testing.assert_array_equal(p.choose(0.0, troubles, answer, V), sent)
-        assert [action for _, action in p.events] == done
-        assert [kind for kind, _ in p.events][:len(troubles)] == troubles
 
 
 @pytest.mark.parametrize("period", [0.001, 0.1, 1.0])
 def test_braking_ends_at_rest_and_never_swings_through_it(period):
-    p, v = policy(period=period), V.copy()
+    p, v = Policy(ControlSection(level="acceleration", period=period, duration=1.0,
+                                 resolver="hcod")), V.copy()
     for _ in range(round(5.0 / period)):
         after = v + p.choose(0.0, ["stale"], X, v) * period
         assert (after * v >= 0.0).all()
@@ -79,15 +34,10 @@ def test_braking_ends_at_rest_and_never_swings_through_it(period):
     assert np.abs(v).max() < 1e-9
 
 
-def controller(*changes, name="ellipse"):
-    made = Controller(load(name, changes))
-    return made, made.cell.plant.q.copy(), made.cell.plant.v.copy()
-
-
 @pytest.mark.parametrize("name", ["ellipse", "ellipse-velocity"])
 def test_without_a_measurement_the_last_state_is_carried_on_by_the_commands_sent(name):
     """Otherwise a robot that brakes blind would brake from a speed it has no more."""
-    c, _, _ = controller("control.damping=1.0", name=name)
+    c = Controller(load(name, ["control.damping=1.0"]))
     plant, nothing, speed = c.cell.plant, np.full(7, np.nan), 0.0
     for k in range(400):
         known = plant.q.copy(), plant.v.copy()
@@ -98,27 +48,6 @@ def test_without_a_measurement_the_last_state_is_carried_on_by_the_commands_sent
         speed = max(speed, np.abs(plant.v).max())
     assert speed > 0.01
     assert np.abs(plant.v).max() < 0.06 * speed
-
-
-@pytest.mark.parametrize(("deadline", "kinds"), [(0.31, []), (0.29, ["overrun"])])
-def test_a_tick_over_its_deadline_is_told_by_the_clock(deadline, kinds):
-    c, q, v = controller(f"control.policy.deadline={deadline}")
-    c.clock = iter(np.arange(0.1, 9.0, 0.1)).__next__  # a tick takes 0.3 s from begin to answer
-    c.command(0.0, q, v)
-    assert [kind for kind, _ in c.policy.events] == kinds
-
-
-@pytest.mark.parametrize("action", ["brake", "use"])
-def test_a_point_inside_an_obstacle_is_trouble_and_may_be_left_by_the_answer(action):
-    inside = "avoidance.obstacles=[{shape='sphere', centre=[0.9, 0.9, 0.9], radius=0.05}]"
-    c, q, v = controller(inside, f"control.policy.inside={action}")
-    c.command(0.0, q, v)
-    assert list(c.policy.events) == []
-    c.cell.sensor.obstacles.centres[0] = c.cell.sensor.measurement.points[2]
-    x = c.command(0.001, q, v)
-    assert list(c.policy.events) == [("inside", action)]
-    assert c.answered
-    assert (x is c.resolution.x) == (action == "use")
 
 
 A, B, C = Key(("position",)), Key(("position", "pointing")), Key(("pointing", "position"))
