@@ -9,13 +9,17 @@ import pinocchio as pin
 from hand_made import asked, recording
 
 from hierarchy import Hierarchy, HierarchyError
-from scenarios import load
+from hierarchy.avoidance import Obstacle
+from hierarchy.notebook import html_table
+from scenarios import load, simulate
 from scenarios.cell.build import build
 from scenarios.cell.plants import torque
-from scenarios.config.distributions import flat
+from scenarios.config.distributions import Distribution, flat
 from scenarios.config.resolvers import default_resolvers
+from scenarios.config.sampling import drawn
 from scenarios.config.validation import _table
 from scenarios.draw.figures import drawing, letter
+from scenarios.export import foxglove
 from scenarios.loop.audit import ActiveSets
 from scenarios.loop.controller import Controller
 from scenarios.loop.footing import footing
@@ -28,6 +32,7 @@ from scenarios.measure.motions import motions, partings
 from scenarios.measure.runs import Run, table
 from scenarios.measure.statistics import best, paired, wilson
 from scenarios.measure.verdict import Verdict, lines, verdicts
+from scenarios.problems import recorded
 from scenarios.recording import listed
 from scenarios.recording.facts import _plain
 from scenarios.recording.fate import levels_at, row_units
@@ -195,7 +200,9 @@ def sampled():
     axes += [-axes[1], *(np.r_[-2.0 - by, ends, 3.0 + by] for by in (0.0, 0.01)),
              *(np.r_[np.full(99, 8.0), beyond] for beyond in (20.0, 25.0)),  # twice as large these
              np.full(9, -8.0), np.zeros(9)]
-    return {"verdicts": ["\n".join([*verdict(one), str(one.paired("speed_max", "b"))])
+    unasked = {"control.options.rank_tolerance": Distribution(uniform=(1e-9, 2e-9))}
+    return {"drawn": [str(drawn(load("ellipse"), unasked, 0, 0))],
+            "verdicts": ["\n".join([*verdict(one), str(one.paired("speed_max", "b"))])
                          for one in runs], "kept": [str(one.shares()) for one in kept],
             "beyond": [text.get_text() for text in sampled_page._spread(
                 far, far.metrics["margin"]).axes[0].texts],
@@ -245,6 +252,15 @@ def shown():
                    for most in (3000, 2999, 1000, 100)]
     with patch.object(page, "html", Mock(side_effect=HierarchyError("no frames"))):
         replays.append(page.replay("a", motions([made()]), 3000))
+    of_joints = [{"kind": "coupling", "joints": {"joint_1": 1.0, "joint_2": 1.0}},
+                 {"kind": "posture"}]
+    two, of_units = simulate(load("ellipse-hqp", {
+        "control.duration": 0.002, "tasks": of_joints})), []
+    for units in (("rad",) * 7, ("m",) * 7, (*("m",) * 6, "rad")):
+        robot = replace(two.facts.robot, velocity_units=units)
+        run = replace(two, facts=replace(two.facts, robot=robot))
+        of_units += [str(levels_at(run, [0]).units), *(
+            f"{section.title} {unit}" for section, unit, _ in listed.errors(run))]
     away = np.where(np.arange(5)[:, None] > 2, np.nan, np.zeros(7))
     resolvers = []
     for missing in ("", "daqp"):
@@ -261,11 +277,17 @@ def shown():
                        for runs in tables],
             "commands": [page.run_command(Run(one.with_resolver(of), of, of), "runs/a")
                          for one, of in ((changed, "hqp:backend=osqp"), (load("ellipse"), "hcod"))],
+            "shapes": [*(str(foxglove.obstacle(0.0, 0, one, np.array(one.centre))) for one in (
+                Obstacle("box", (1.0, 2.0, 3.0), (0.1, 0.2, 0.3)), Obstacle("point", (1., 2., 3.)),
+                Obstacle("capsule", (1.0, 2.0, 3.0), (0.05, 0.2)))), str(
+                    foxglove._capsule(np.ones(3), np.ones(3), 0.5, foxglove._ARM))],
+            "html": [html_table("<b>", ("a&b",), rows, best={(1, 0)}) for rows in (
+                [("<i>",), (2,)], [(i,) for i in range(100)], [(i,) for i in range(30)])],
             "replays": replays, "units": [str(row_units(*given, {})) for given in (
                 (load("ellipse-hqp", {"tasks": tasks, "pointing": None}), [
                     "look-at", "pointing", "position"]), *(
                     (load("wipe", {"tasks.0.target": [20.0] * n}), ["force"]) for n in (1, 3, 6)))],
-            "settings": [repr(_plain(value)) for value in (
+            "units of joints": of_units, "settings": [repr(_plain(value)) for value in (
                 1.5, None, (1, 2.0), np.inf, (1.0, np.inf), [1.0])],
             "frames": [scene(recording(q=away, order=np.zeros(5, int)), rate).ticks
                        for rate in (1.0, 1e15)],
@@ -329,6 +351,42 @@ def doubts():
     return found
 
 
+
+def windows():
+    """Which ticks of which runs become problems, and of runs that end before their window."""
+    found = {}
+
+    def of(name, ends, seed, count, make):
+        asked = []
+
+        def window(scenario, first, count):
+            plant = scenario.plant
+            asked.append(f"{scenario.control.period * first:.6g} {scenario.start.q} " + str([
+                getattr(plant, key, None) for key in (
+                    "stops", "joint_friction", "joint_damping", "armature")] + [
+                        scenario.limits.horizon]))
+            return [Hierarchy.from_levels(
+                [(np.eye(3)[:1], [k]), (np.eye(3)[:2], [7.0, 7.0]), (np.eye(3)[2:], [1.0])],
+                names=("a", recorded.LEFT_OUT, "b")) for k in range(count - (len(asked) in ends))]
+
+        with patch.object(recorded, "window", window):
+            made = make(name, seed, count)
+        found[f"{name} {seed}"] = asked
+        return made
+
+    made = of("DYN60", (2,), 60, 12, recorded.fresh)
+    for seed in (0, 3, 4):
+        of("ellipse-limits", (2, 3) if seed == 3 else (), seed, 2, recorded.recorded)
+    with patch.object(recorded, "uninterrupted", lambda *_, **__: None):
+        try:
+            recorded.recorded("ellipse-limits", 3, 2)
+        except HierarchyError as error:
+            found["none"] = [str(error)]
+    return found | {"made": [[" ".join(one.h.names), one.proof.x, one.proof.complete, str(
+        one.before and [k for k, other in enumerate(made) if one.before is other.h])]
+                             for one in made]}
+
+
 COMPUTED = {"signals": signals, "told": told, "statistics": statistics, "causes": answers,
             "parted": parted, "sampled": sampled, "acting": acting, "shown": shown,
-            "standing": standing, "doubts": doubts}
+            "standing": standing, "doubts": doubts, "windows": windows}

@@ -117,13 +117,23 @@ register("plants", "none")(lambda: None)
 register("robots", "same")(Robot.named("kuka_lwr"))
 register("robots", "odd")(lambda: 1 / 0)
 register("figures", "odd")(Panel("odd", "Odd", "rad", "q", lambda *_: exit(3)))
+register("figures", "first-joint")(Panel(
+    "first-joint", "First", "rad", "q",
+    lambda ax, run, colour: ax.plot(run["t"], run["q"][:, 0], color=colour)))
 register("sensors", "odd")(lambda exact: exact.measurement)
+register("signals", "strain")(Signal("strain", "Pa", "(T,)", "of a link", "/links"))
 register("signals", "file")(Signal("odd", "Pa", "(T,)", ""))
 register("tasks", "odd")(type("OddTask", (JointCoupling,), {"dimension": 1.5}))
 for name, kind in (
         ("function", len), ("number", int),
         ("failing", type("Failing", (Halved,), {"__post_init__": lambda self: 1 / 0})),
         ("unsure", type("Unsure", (Halved,), {"accuracy": float("nan")})),
-        ("status", type("Odd", (Resolver,), {"name": "status", "handles": "inequalities", "solve": (
-            lambda self, h, memory: Resolution(h.start(), "SOLVED"))}))):
+        *((name, type(name.title(), (Resolver,), {
+            "name": name, "handles": "inequalities", "solve": solve})) for name, solve in (
+                ("status", lambda self, h, memory: Resolution(h.start(), "SOLVED")),
+                ("array", lambda self, h, memory: h.start()),
+                ("one", lambda self, h, memory: Resolution(1.0)),
+                ("few", lambda self, h, memory: Resolution(np.zeros(3))),
+                ("unknown", lambda self, h, memory: Resolution(np.full(h.n, np.nan))),
+                ("attribute", lambda self, h, memory: h.nonsense)))):
     register("resolvers", name)(kind)

@@ -190,6 +190,7 @@ def seen_of_figures():
                    timeline.timeline(recording(t=[2.0]))), "joints": [
                 figure_facts(letter.stacked([(run, [speeds]) for run in of], ""))
                 for of in ([runs[5]], [runs[6]], pair)],
+            "no tick": figure_facts(recording(t=[]).plot()),
             "nearest": picture._nearest(recording(minimal_distance=[2.0, np.nan, 1.0, 2.0, 2.0]))}
 
 
@@ -428,6 +429,7 @@ PARTS = {**{f"run {name}": partial(seen_of_run, name) for name in RUNS},
          "answers": seen_of_answers, "live page": partial(seen_of_live_page, "ellipse"),
          "live page of a cone": partial(seen_of_live_page, "ellipse", position=None,
                                         avoidance=None),
+         "live page of a table": partial(seen_of_live_page, "wipe"),
          "keys": seen_of_keys, "figures": seen_of_figures,
          "problems": seen_of_problems, "robots": seen_of_robots}
 

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from hand_made import asked, recording
 from headless import Balanced, chromium
+from scene import TURN
 
 from hierarchy.avoidance import Measurement, Obstacle
 from hierarchy.avoidance.measurement import measure_exactly
@@ -18,8 +19,6 @@ from scenarios.measure.verdict import Comparison
 from scenarios.results.page import comparison_page as page
 
 LETTER = "tpm-published"
-TURNED = [[0.36, 0.48, -0.8], [-0.8, 0.6, 0.0], [0.48, 0.64, 0.6]]
-
 
 def made(spec="tpm-published", fault=None, error=None, scenario=None, **signals):
     scenario = (scenario or asked()).with_resolver(spec)
@@ -86,8 +85,8 @@ def test_figures_drawn_anew_take_the_place_of_those_in_the_run_folder(tmp_path, 
 
 @pytest.mark.parametrize("obstacle", [
     Obstacle("point", (0.3, 0.0, 0.2)), Obstacle("sphere", (0.3, 0.0, 0.2), (0.1,)),
-    Obstacle("capsule", (0.3, 0.0, 0.2), (0.1, 0.4), TURNED),
-    Obstacle("box", (0.3, 0.0, 0.2), (0.1, 0.2, 0.3), TURNED)], ids=lambda one: one.shape)
+    Obstacle("capsule", (0.3, 0.0, 0.2), (0.1, 0.4), TURN),
+    Obstacle("box", (0.3, 0.0, 0.2), (0.1, 0.2, 0.3), TURN)], ids=lambda one: one.shape)
 def test_an_obstacle_is_drawn_as_far_as_distances_say_that_it_reaches(obstacle):
     balls, radius = picture.hull(obstacle)
     for direction in np.random.default_rng(1).normal(size=(20, 3)):

@@ -7,13 +7,11 @@ import subprocess
 import sys
 from unittest import mock
 
-import numpy as np
 import pytest
 from deadly import dies_of_one
 from refusals import refused
 
 from scenarios import load, shipped, simulate
-from scenarios.config.distributions import Distribution
 from scenarios.config.sampling import drawn
 from scenarios.measure import metrics
 from scenarios.results import plan as plan_of
@@ -88,20 +86,6 @@ def test_every_shipped_sweep_can_be_planned_and_every_scenario_varies():
     for scenario in map(load, shipped()):
         first, second = (drawn(scenario, scenario.variation, 0, index) for index in range(2))
         assert first != second
-
-
-def test_samples_are_drawn_from_what_the_file_says(tmp_path):
-    asked, ellipse = load_sweep(write(tmp_path)), load("ellipse")
-    found = [drawn(ellipse, asked.parameters, asked.seed, index) for index in range(400)]
-    q = np.array([one["start.q"] for one in found]) - ellipse.start.q
-    assert np.abs(q).max() <= 0.05
-    assert q.std() == pytest.approx(0.05 / np.sqrt(3.0), rel=0.05)
-    damping = [one["position.damping"] for one in found]
-    assert (np.mean(damping), np.std(damping)) == pytest.approx((20.0, 1.0), abs=0.15)
-    assert {one["pointing.alpha_d"] for one in found} == {5.0, 15.0}
-    assert {one["plant.measurement.seed"] for one in found} == {3, 4, 5}
-    left_out = {"control.options.rank_tolerance": Distribution(uniform=(1e-9, 1e-9))}
-    assert drawn(ellipse, left_out, 0, 0) == {"control.options.rank_tolerance": 1e-9}
 
 
 def test_runs_are_made_again_after_a_file_that_their_scenario_names_has_changed(tmp_path):

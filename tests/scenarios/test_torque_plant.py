@@ -7,13 +7,11 @@ import pinocchio as pin
 import pytest
 from mechanisms import four_bar
 from refusals import refused
-from scipy.spatial.transform import Rotation
 from standing import IDEAL, ROBOT, accelerations, feet, moving_state
 from urdf_text import INERTIAL, LIMIT, joint, link, urdf
 
 from hierarchy import Robot, State
 from hierarchy.contacts import Contacts
-from hierarchy.tasks import TorqueLimits
 from scenarios import load
 from scenarios.cell.build import build
 from scenarios.cell.plants.torque import TorqueRobot
@@ -74,17 +72,6 @@ def one_joint(folder, inertial=INERTIAL, limit=LIMIT, kind="revolute"):
         "only", kind, "base", "arm", limit)))
 
 
-@pytest.mark.parametrize("period", [0.0005, 0.001, 0.0025, 0.004])
-def test_a_period_is_simulated_in_steps_of_a_millisecond_at_most(period, tmp_path):
-    plant = alone(one_joint(tmp_path), np.zeros(1), period=period, bandwidth=60.0)
-    before = plant.data.ctrl.copy()
-    plant.act(np.full(1, 2.0))
-    assert plant.data.time == pytest.approx(period)
-    assert 0.0005 <= plant.model.opt.timestep <= 0.001
-    share = 1.0 - np.exp(-2.0 * np.pi * 60.0 * period)
-    np.testing.assert_allclose(plant.data.ctrl, before + share * (2.0 - before))
-
-
 def test_an_inertia_that_no_body_has_becomes_its_mean(tmp_path):
     robot = one_joint(tmp_path, INERTIAL.replace("0.4", "1.4"))
     moments = np.linalg.eigvalsh(robot.model.inertias[1].inertia)
@@ -113,19 +100,6 @@ def test_a_joint_of_several_axes_is_named():
     refused("joint 'rocker' does not turn", alone, bar, error=ScenarioError)
 
 
-def test_torques_arrive_late_by_the_delay_and_are_cut_off_at_their_limits():
-    q, v, _ = in_the_air(8)
-    plant = TorqueRobot(ROBOT, CONTACTS, q, v, section=plant_with(delay=0.002))
-    holding, sent = State.at(ROBOT, q).bias_effort()[6:], []
-    for _ in range(4):
-        plant.act(np.full(30, 1e4))
-        sent.append(plant.data.actuator_force.copy())
-    np.testing.assert_allclose(sent[0], np.clip(holding, -ROBOT.effort_limit[6:],
-                                                ROBOT.effort_limit[6:]))
-    np.testing.assert_array_equal(sent[0], sent[1])
-    np.testing.assert_allclose(sent[2], ROBOT.effort_limit[6:])
-
-
 def test_a_push_gives_the_whole_robot_its_momentum():
     q, _, _ = in_the_air(9)
     push = PushSection(joint="trunk_pitch", force=100.0, direction=90.0, at=0.005, duration=0.01)
@@ -141,21 +115,6 @@ def test_a_push_gives_the_whole_robot_its_momentum():
     np.testing.assert_allclose(np.sum(seen, axis=0), [0.0, 1000.0, 0.0], atol=1e-9)
 
 
-def two_arms(**keys):
-    robot = Robot.named("dual_arm")
-    robot.lower[2] = -np.inf  # and a stop above
-    return robot, alone(robot, robot.configuration(np.zeros(robot.n)), beyond_stop=1e3, fall=1e3,
-                        tilt=3.0, **keys)
-
-
-def test_a_joint_stops_at_its_limit_unless_it_has_no_stop():
-    robot, with_stops = two_arms()
-    _, without = two_arms(stops=False)
-    torque, limit = 20.0 * np.eye(robot.n)[2], robot.upper[2]
-    assert driven(with_stops, torque, 2.0).q[2] < limit + 0.1
-    assert driven(without, torque, 2.0).q[2] > limit + 0.5
-
-
 def test_a_continuous_joint_has_no_stop_and_an_arm_that_sinks_does_not_fall(tmp_path):
     """The limits of its cosine, 1.01, were those of its angle."""
     robot = one_joint(tmp_path, limit="", kind="continuous")
@@ -164,41 +123,6 @@ def test_a_continuous_joint_has_no_stop_and_an_arm_that_sinks_does_not_fall(tmp_
         plant.act(State.at(robot, plant.q).bias_effort())
     assert robot.vector(plant.q) > 2.9
     assert plant.fault is None
-
-
-def test_torques_follow_with_the_bandwidth_of_the_motors():
-    robot, slow = two_arms(bandwidth=5.0)
-    first = slow.data.ctrl[0]
-    driven(slow, 10.0 * np.eye(robot.n)[0], 1.0 / (2.0 * np.pi * 5.0))
-    assert slow.data.ctrl[0] - first == pytest.approx((10.0 - first) * (1.0 - np.exp(-1.0)),
-                                                      rel=0.05)
-
-
-def test_a_base_that_tilts_has_fallen():
-    q, v = ROBOT.rest.copy(), np.zeros(ROBOT.n)
-    q[2] += 100.0
-    v[3:6] = [1.0, -2.0, 0.5]
-    plant = TorqueRobot(ROBOT, feet(), q, v,
-                        section=plant_with(tilt=0.5, fall=1e3, beyond_stop=1e3))
-    for _ in range(1000):
-        angle = Rotation.from_quat(plant.q[3:7]).apply([0.0, 0.0, 1.0])[2]
-        assert (plant.fault is not None) == (np.arccos(angle) > 0.5)
-        if plant.fault:
-            break
-        plant.act(np.zeros(ROBOT.n - 6))
-    assert plant.fault.startswith("the robot has fallen: its base has tilted by 0.5 rad (")
-
-
-def test_a_share_of_the_torques_limits_them_and_what_stays_the_same_is_kept():
-    scenario = load("reach-torque", ["limits.torque=0.5"])
-    cell = build(scenario)
-    half = 0.5 * cell.robot.effort_limit[6:]
-    np.testing.assert_array_equal(cell.torque_limit, half)
-    limits = TorqueLimits(cell.robot, 0.5, contacts=cell.contacts)
-    np.testing.assert_array_equal(limits.bounds(cell.state), [-half, half])
-    assert scenario.model_copy(update={"limits": None}).asks == "inequalities"
-    seen = build(load("ellipse"))
-    assert build(load("ellipse", ["position.gain=2.0"]), seen).sensor is seen.sensor
 
 
 def test_a_robot_that_is_put_on_the_floor_is_carried_from_the_first_tick_on():
