@@ -6,17 +6,19 @@ from unittest.mock import Mock, patch
 
 import numpy as np
 import pinocchio as pin
-from hand_made import asked, recording
+from hand_made import ROBOT, asked, recording
 
-from hierarchy import Hierarchy, HierarchyError
-from hierarchy.avoidance import Obstacle
+from hierarchy import Hierarchy, HierarchyError, State
+from hierarchy.avoidance import Obstacle, Obstacles
 from hierarchy.notebook import html_table
 from scenarios import load, simulate
 from scenarios.cell.build import build
 from scenarios.cell.plants import torque
+from scenarios.cell.sensors.camera import DepthCamera, Pinhole
 from scenarios.config.distributions import Distribution, flat
 from scenarios.config.resolvers import default_resolvers
 from scenarios.config.sampling import drawn
+from scenarios.config.sections.sensor import CameraSection
 from scenarios.config.validation import _table
 from scenarios.draw.figures import drawing, letter
 from scenarios.export import foxglove
@@ -387,6 +389,29 @@ def windows():
                              for one in made]}
 
 
+def images():
+    """Sums over images of a wall, and of a ball before it, with one kind of error each; times."""
+    errors = {"noise_floor": 0.0, "noise_growth": 0.0, "rounding": "step", "step": 0.0,
+              "missing": 0.0, "missing_at_edges": 0.0, "outliers": 0.0}
+    state, eye, found = State.at(ROBOT, ROBOT.rest), Pinhole(80, 60, 70.0, 65.0), {}
+    ball, rate = Obstacle("sphere", (0.0, 0.0, 2.0), (0.5,)), {"rate": 30.0, "jitter": 0.02}
+    for name, change in (("exact", {}), ("noise", {"noise_floor": 1e-3, "noise_growth": 2e-3}),
+                         ("missing", {"missing": 0.1}), ("edges", {"missing_at_edges": 0.5}),
+                         ("outliers", {"outliers": 0.3}), ("steps", {"step": 0.01}), (
+                             "disparity", {"rounding": "disparity", "step": 2.85e-3})):
+        section = CameraSection(kind="camera", backdrop=3.0, **errors | change)
+        for of in ((), (ball,)):
+            camera = DepthCamera(section, eye, Obstacles(of), ())
+            taken = (camera.image(i, state)[0] for i in range(20))  # one array, written again
+            found[f"{name} {len(of)}"] = [[float(one.sum()), np.count_nonzero(one != 3.0)]
+                                          for one in taken]
+    for seed in (3, 4):
+        late = DepthCamera(CameraSection(kind="camera", seed=seed, **rate), eye, Obstacles(()), ())
+        times = [late.time(i) for i in range(50)]
+        found[f"times {seed}"] = [times, [late.newest(t - by) for t in times for by in (0.0, 1e-6)]]
+    return found
+
+
 COMPUTED = {"signals": signals, "told": told, "statistics": statistics, "causes": answers,
             "parted": parted, "sampled": sampled, "acting": acting, "shown": shown,
-            "standing": standing, "doubts": doubts, "windows": windows}
+            "standing": standing, "doubts": doubts, "windows": windows, "images": images}

@@ -4,6 +4,7 @@ from dataclasses import dataclass
 from typing import ClassVar
 
 import numpy as np
+from mechanisms import four_bar
 
 from hierarchy import Robot, Task
 from hierarchy.paths import Path
@@ -115,6 +116,7 @@ def own(recording, by):
 
 register("plants", "none")(lambda: None)
 register("robots", "same")(Robot.named("kuka_lwr"))
+register("robots", "four_bar")(four_bar)
 register("robots", "odd")(lambda: 1 / 0)
 register("figures", "odd")(Panel("odd", "Odd", "rad", "q", lambda *_: exit(3)))
 register("figures", "first-joint")(Panel(

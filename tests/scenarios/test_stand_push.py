@@ -8,6 +8,7 @@ from scenarios.measure.metrics import measure
 
 pytest.importorskip("mujoco")
 
+
 # Not of robots of packages: the certificate rejects 13 of 150 answers of stand-g1, and 2 of
 # stand-talos, that are right to 1e-14, as a proof in 120 digits shows.
 @pytest.mark.parametrize("name", sorted(
