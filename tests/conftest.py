@@ -4,7 +4,6 @@ import gc
 import os
 import shlex
 import signal
-import sys
 from importlib.metadata import distributions
 from pathlib import Path
 
@@ -45,22 +44,12 @@ def _interruptible():
 
 
 @pytest.fixture
-def no_plugins(monkeypatch):
+def no_plugins():
     """No plugin is known at the beginning of a test; what it loads is forgotten after it."""
-    from hierarchy import plugins
-    from solvers.resolver import _REGISTRY
+    from unplugged import unplugged
 
-    monkeypatch.setattr(sys, "path", list(sys.path))
-    monkeypatch.setattr(plugins, "_registered", {group: {} for group in plugins.GROUPS})
-    monkeypatch.setattr(plugins, "_loaded", {})
-    monkeypatch.setattr(plugins, "_flagged", {})
-    before = dict(_REGISTRY)
-    yield
-    for module in plugins._loaded:
-        sys.modules.pop(module, None)
-    _REGISTRY.clear()
-    _REGISTRY.update(before)
-    plugins._points.cache_clear()
+    with unplugged():
+        yield
 
 
 @pytest.fixture

@@ -11,35 +11,23 @@ from unittest import mock
 import numpy as np
 import pytest
 from c_library import COMPILER
+from computed_bench import collection, simple
 
 from benchmark import solve
 from benchmark.packages import OWN, Entrant
 from benchmark.process import CRASHED, HUNG, LEFT_OUT, Field
 from benchmark.solve import judge as judging
 from benchmark.solve import open as opened
-from benchmark.solve import resolvers, views
+from benchmark.solve import resolvers
 from benchmark.solve.entrants import chosen, compiled
 from benchmark.worker import Repeats
 from hierarchy import Hierarchy, HierarchyError
 from solvers import make
-from solvers.problems.files import Collection, Head, read
+from solvers.problems.files import read
 from solvers.proof import prove
 
 HELPERS = Path(__file__).parents[1] / "helpers"
 SOLVE = Path(solve.__file__).parent
-
-
-def simple(side):
-    """x1 = side, then x2 <= 1 against x2 = 2: the least violations are 0, 0 and 1."""
-    return Hierarchy.from_levels([([[1.0, 0.0]], [side]), ([[0.0, 1.0]], [-np.inf], [1.0]),
-                                  ([[0.0, 2.0]], [4.0])])
-
-
-def collection(problems, sequence=False):
-    answers = tuple(prove(h, [np.linalg.lstsq(h.A, np.where(np.isfinite(h.lower), h.lower, 0.0))[0],
-                              [h.lower[0], 1.0]]) for h in problems)
-    return Collection(Head("simple", "for tests", "fresh", 7, sequence, 0.001 * sequence),
-                      tuple(problems), answers)
 
 
 @pytest.fixture(scope="module")
@@ -98,91 +86,6 @@ def test_our_c_library_answers_behind_the_header_as_python_does(folder, tmp_path
         assert 1 <= len(row["cold_inside_ns"]) <= Repeats().most
         assert 0 <= min(row["cold_inside_ns"]) < min(row["cold_ns"])
     assert max(row["warm_iterations"] for row in rows["hcod"][1:]) < rows["hcod"][0]["iterations"]
-
-
-def raw(x, collected, problem=0, solved=True, **more):
-    return {"entrant": "one", "version": "1", "family": "simple", "half": "fresh", "seed": 7,
-            "sha256": collected.digest, "problem": problem, "solved": solved, "same": True,
-            "x": None if x is None else list(map(float, x)), "cold_ns": [1000, 3000, 2000], **more}
-
-
-def found(x, solved=True, **more):
-    one = collection([simple(3.0)])
-    return judging.judge([raw(x, one, solved=solved, **more)], {one.digest: one})[0]
-
-
-@pytest.mark.parametrize(("x", "solved", "verdict", "level"), [
-    ([3.0, 1.0], True, judging.SOLVED, -1), ([3.0, 1.0], False, judging.MODEST, -1),
-    ([3.0 + 1e-7, 1.0], True, judging.SOLVED, -1), ([3.1, 1.0], True, judging.WRONG, 0),
-    ([3.0, 1.5], True, judging.WRONG, 1), ([3.0, 0.5], True, judging.WRONG, 2),
-    ([3.0, 0.5], False, judging.FAILED, 2), ([np.nan, 1.0], True, judging.WRONG, 0),
-    ([3.0], True, judging.WRONG, 0)])
-def test_only_x_decides_whether_an_answer_is_right(x, solved, verdict, level):
-    one = found(x, solved)
-    assert (one["verdict"], one["level"]) == (verdict, level)
-    if x == [3.0, 0.5]:  # |2 * 0.5 - 4| beyond 2
-        assert (one["absolute"], one["relative"]) == pytest.approx((1.0, 0.5 / (1.0 + 10.0**0.5)))
-
-
-@pytest.mark.parametrize("x", [[3.0], [[3.0], [1.0]], 3.0])
-def test_an_answer_of_another_shape_is_wrong_and_stops_no_report(x):
-    one = collection([simple(3.0)] * 2, sequence=True)
-    rows = [{**raw(None, one, p), "x": x, "without": [3.0]} for p in (0, 1)]
-    rows = judging.judge(rows, {one.digest: one})
-    assert [row["verdict"] for row in rows] == [judging.WRONG] * 2
-    assert np.isnan(judging.summary(rows, {"simple": 2.0})["moved"])
-
-
-@pytest.mark.parametrize(("more", "verdict"), [
-    ({"ended": CRASHED}, judging.CRASHED), ({"ended": HUNG}, judging.HUNG),
-    ({"ended": LEFT_OUT}, judging.CRASHED), ({"refused": "no"}, judging.REFUSED),
-    ({"raised": "Error"}, judging.RAISED)])
-def test_what_is_not_answered_has_its_own_verdict(more, verdict):
-    assert found(None, **more)["verdict"] == verdict
-
-
-def test_a_summary_counts_and_takes_the_worst_of_what_is_called_solved():
-    one = collection([simple(3.0), simple(1.0)], sequence=True)
-    rows = judging.judge([raw([3.0, 1.0], one), raw([1.5, 1.0], one, 1)], {one.digest: one})
-    whole = judging.summary(rows, {"simple": 2.0})
-    assert (whole["right"], whole["wrong"], whole["answered"]) == (0.5, 1, 2)
-    assert whole["absolute"] == pytest.approx(0.5)
-    assert whole["rough"] == pytest.approx(0.75)  # 1.5 where the proved answers move by 2
-    assert (whole["median_us"], whole["most_us"]) == (2.0, 3.0)
-    assert np.isnan(whole["warm_median_us"])
-    assert np.isnan(judging.summary([found(None, refused="no", start_kib=1000)])["memory_mb"])
-
-
-def test_steps_to_an_answer_that_is_not_finite_are_no_steps():
-    points = [np.array([np.inf]), np.array([np.inf]), None, np.zeros(1), np.ones(1), np.ones(2)]
-    assert judging._step(points) == judging._step(points[::-1]) == 1.0
-    assert np.isnan(judging._step(points[:4]))
-
-
-def test_the_best_may_lack_a_family_that_another_was_asked_later():
-    def row(name, family, asked, right):
-        return {"entrant": name, "family": family, "asked": asked, "right": right, "median_us": 1.0}
-
-    total = [row("best", "", 100, 1.0), row("other", "", 102, 0.5)]
-    some = [row("best", "a", 100, 1.0), row("other", "a", 100, 0.5), row("other", "b", 2, 0.5)]
-    for refused in ([], [row("best", "b", 0, np.nan)]):
-        assert "More often right than best: none." in views.lead("", total, [*some, *refused])
-    of = row("equalities", "a", 0, np.nan), row("best", "a", 100, 0.9), row("other", "a", 100, 1.0)
-    assert "More often right than best: a (other, 100% against 90.0%)." in views.lead("", total, of)
-
-
-def test_a_set_that_nobody_can_be_asked_has_its_tables():
-    section, _ = views.section("a", [found(None, refused="no", start_kib=0)], {}, {})
-    assert section.tables[0].cells()[0] == ("one", ["0", "–", "0", "0", "0", "0", "0"])
-    assert not section.figures
-
-
-@pytest.mark.parametrize("asked", [[], ["one"]])
-def test_borders_may_lack_what_was_asked_later(asked):
-    rows = [found([3.0, 1.0], entrant=name, start_kib=0) for name in ("one", "later")]
-    at = {border: [row for row in rows if row["entrant"] in asked] for border in (1e-9, 1e-8)}
-    section, _ = views.section("a", rows, {}, at)
-    assert ("a: right over border" in section.figures) == bool(asked)
 
 
 @pytest.mark.parametrize(("call", "said"), [

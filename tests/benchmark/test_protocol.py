@@ -11,50 +11,7 @@ from refusals import refused
 
 from benchmark.reproduce import blocks, fronts, pages, protocol, verdicts, whole
 from hierarchy.errors import HierarchyError
-from scenarios.measure.statistics import holm
 from scenarios.results.sampled import Workers
-
-LAYOUTS, SEEDS, STARTS = ["a", "b"], [1, 2], 25
-SIZE = len(LAYOUTS) * len(SEEDS) * STARTS
-
-
-def rows(noisy=None, **columns):
-    values = [{name: {"speed_max": [float(one) if np.isfinite(one) else None for one in some],
-                      "reached_end": list(np.isfinite(some).astype(float))}
-               for name, some in run.items()} for run in (columns, {**columns, **(noisy or {})})]
-    about = {"speed_max": {"label": "Joint speed, max", "unit": "rad/s", "lower": True}}
-    return protocol.Rows(LAYOUTS, SEEDS, STARTS, about, values, [{}, {}])
-
-
-def verdict(found, **claim):
-    of = protocol.Claim("one", "own", "a text", "x", "speed_max", **claim)
-    return verdicts.judged(replace(protocol.PROTOCOL, claims=(of,)), found, "own")[0]
-
-
-def test_an_effect_counts_only_if_its_whole_interval_is_beyond_what_matters():
-    chance = np.random.default_rng(5)
-    y = chance.uniform(1.0, 2.0, SIZE)
-    x = 0.8 * y * np.exp(0.05 * chance.standard_normal(SIZE))
-    for matters, expected in ((5.0, "supported"), (20.0, "undecided"),
-                              (40.0, "no effect that matters")):
-        found = verdict(rows(x=x, y=y), below="y", percent=True, matters=matters)
-        assert found.decided == expected
-    assert found.p < 1e-6
-    assert verdict(rows(x=x, y=y), above="y", percent=True, matters=5.0).decided == "contradicted"
-    same = np.where(np.arange(SIZE) < SIZE // 2, y, y - 10.0)  # on the first layout
-    for side in ("below", "above"):
-        assert verdict(rows(x=same, y=y), **{side: "y"}, matters=0.0).decided.startswith("differs")
-    assert verdicts.shown(found.claim, rows(x=x, y=y), found.effect).startswith("-19.8 [")
-
-
-def test_a_run_that_ends_in_a_fault_has_the_worst_value():
-    y, x = np.ones(SIZE), np.full(SIZE, np.inf)
-    found = verdict(rows(x=x, y=y), above="y", matters=0.1)
-    assert found.decided == "supported"
-    assert verdicts.shown(found.claim, rows(x=x, y=y), found.effect) == "∞ [∞, ∞] rad/s"
-    assert verdict(rows(x=x, y=x), above="y", matters=0.1).decided == "no effect that matters"
-    assert verdict(rows(x=x), most=5.0).decided == "contradicted"
-    assert verdict(rows(x=y), most=5.0).decided == "supported"
 
 
 def test_the_blocked_test_is_wilcoxons_in_one_block_and_ignores_shifts_between_blocks():
@@ -65,13 +22,6 @@ def test_the_blocked_test_is_wilcoxons_in_one_block_and_ignores_shifts_between_b
     assert found.low < found.estimate < found.high
     shifted = verdicts.blocked(apart - found.low - 1e-9, np.zeros(40, dtype=int))
     assert shifted.p == pytest.approx(0.05, abs=0.01)
-    assert holm([0.01, 0.04, 0.03]) == pytest.approx([0.03, 0.06, 0.06])
-
-
-def test_an_effect_between_infinite_ones_of_both_signs_is_none():
-    apart = np.array([-np.inf, -np.inf, np.inf, np.inf])
-    found = verdicts.blocked(apart, np.zeros(4, dtype=int))
-    assert (found.estimate, found.low, found.high) == (0.0, -np.inf, np.inf)
 
 
 def test_every_claim_names_columns_that_load_on_the_letters_own_robot():
@@ -102,12 +52,6 @@ def test_runs_are_resumed_and_noise_is_small(tmp_path, monkeypatch):
     assert protocol.read(tmp_path / "rows.json") == first
 
 
-def test_only_what_nothing_else_improves_is_on_the_front():
-    scores = np.array([[1.0, 4.0], [2.0, 2.0], [2.0, 3.0], [np.inf, np.inf]])
-    assert [fronts.dominated(scores, k) for k in range(4)] == [False, False, True, True]
-    assert not fronts.dominated(np.full((2, 2), np.inf), 0)
-
-
 def test_trials_that_are_left_out_of_the_second_scene_are_not_on_the_front(monkeypatch):
     rng, ran = np.random.default_rng(5), []
     scores = rng.exponential(size=(40, 2, 3))
@@ -123,16 +67,6 @@ def test_trials_that_are_left_out_of_the_second_scene_are_not_on_the_front(monke
     assert ([k for k in range(40) if not fronts.dominated(found, k)]
             == [k for k in range(40) if not fronts.dominated(whole, k)])
     assert sum(ran[1:]) < 30
-
-
-def test_the_test_of_a_front_gives_medians_and_none_where_half_of_the_scenes_fail(monkeypatch):
-    one = fronts.Front("ellipse", ["x", "y"], {"strict": {"resolver": "hcod"}})
-    scores = np.array([[[3.0, 1.0], [1.0, 2.0], [2.0, np.inf], *[[8.0, np.inf]] * 2, [4.0, 9.0]]])
-    monkeypatch.setattr(fronts, "FRONTS", {"one": one})
-    monkeypatch.setattr(fronts, "_trained", lambda *_: scores[:, 0])
-    monkeypatch.setattr(fronts, "_scores", lambda *_: (scores, ["m", "m"]))
-    (point,) = fronts.run(Path(), Workers())
-    assert (point.test, point.kept) == ([3.5, None], 3)
 
 
 ROOT = Path(__file__).parents[2]
@@ -189,8 +123,6 @@ def test_what_is_not_there_yet_is_named_and_ends_no_filling():
     asked = {"table": "EQ7", "row": "hcod", "place": "3"}
     with pytest.raises(HierarchyError, match="row 'hcod' below 'EQ7' of the output has no number"):
         blocks.cell("EQ7\nhcod 1.0 2.0\n", asked)
-    assert pages._median("EQ7\nhcod – –\n", "EQ7", "hcod") == "–"
-    assert "hierarchy reproduce fronts" in fronts.table([], next(iter(fronts.FRONTS)))[0]
 
 
 def page(mark, inside=""):

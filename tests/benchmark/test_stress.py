@@ -3,7 +3,6 @@
 import csv
 import json
 import os
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -11,10 +10,8 @@ import pytest
 from benchmark import start, stress
 from benchmark.solve import first_paper, resolvers
 from benchmark.solve.entrants import NUMPY
-from benchmark.solve.judge import FAILED, RIGHT, SOLVED, WRONG, judged
 from benchmark.solve.ours import Ours
-from benchmark.start import Case, run
-from benchmark.studies import saturation, smooth
+from benchmark.start import Case
 from benchmark.tick import PlainTick
 from hierarchy import Hierarchy
 from scenarios import load, simulate
@@ -139,29 +136,6 @@ def test_a_row_for_everybody_in_every_family_asked(tmp_path, capsys, monkeypatch
     assert "…" not in out
 
 
-def test_a_warm_start_is_judged_by_its_own_answer():
-    """Not by that of the cold one, also where it is not called solved."""
-    one = recorded.family("EQ7")[0]
-    x = one.proof.x
-    for off, solved, expected in ((0.0, True, SOLVED), (1.0, True, WRONG), (1.0, False, FAILED)):
-        row = {"entrant": "one", "solved": True, "x": x, "warm_ns": [1], "warm_iterations": 1,
-               "warm_x": x + off, "warm_solved": solved}
-        found = resolvers._warm(row, one)
-        assert (found["verdict"], found["relative"] > RIGHT) == (expected, off > 0.0)
-
-
-def test_what_is_not_answered_is_not_the_best_in_a_study():
-    h = Hierarchy.from_levels([(np.eye(1), [-1.0], [1.0]), (np.eye(1), [1.0])])
-    row = judged({"entrant": "one", "family": "f", "raised": "not today"}, h, None)
-    found = saturation._row([row], 1)
-    assert (found["off"], found["nearest"], found["optimal_1"]) == (1, 0.0, 0.0)
-    fallen = SimpleNamespace(runs=[SimpleNamespace(label="one")], reasons=["fell"],
-                             values=["torque_step_max"], column=lambda *_: np.array([np.nan]))
-    found = smooth._row(fallen, "one", "torque_step")
-    assert found["stood"] == "0 of 1"
-    assert np.isnan([found[key] for key in ("largest", "above", "limits", "excess")]).all()
-
-
 def test_the_plain_numpy_tick_commands_what_the_compiled_one_does():
     """Else the benchmark would compare two different jobs."""
     scenario = load("ellipse")
@@ -169,22 +143,6 @@ def test_the_plain_numpy_tick_commands_what_the_compiled_one_does():
     for k in range(0, path.ticks, 100):
         found = plain.step(path["t"][k], path["q"][k], path["v"][k])
         np.testing.assert_allclose(found, path["a"][k], atol=1e-8)
-
-
-def test_everything_measured_is_told(monkeypatch):
-    events = [[0.0, True, "solvers.kernels.a.b"], [2.0, False, "solvers.kernels.a.b"]]
-    cases = [Case("help", 0.5, ["a"]), Case("first", None, [start._COMPILE]),
-             Case("library", 10.0, ["b"])]
-    said = {"help": (0.1, 0.09, None), "first": (20.0, 19.0, events), "library": (11.0, 8.0, None),
-            "memory": (1.0, 1.0, [301.0]), "memory of a worker": (1.0, 1.0, [250.0] * 20)}
-    monkeypatch.setattr(start, "_cases", lambda folder: cases)
-    monkeypatch.setattr(start, "_measured", lambda case: said[case.what])
-    found = run()
-    assert [row["met"] for row in found.rows["start"]] == [
-        True, None, None, False, False, True, None]
-    assert [row["value"] for row in found.rows["start"]] == [0.1, 20.0, 2.0, 11.0, 301.0, 250.0, 0]
-    assert found.rows["compilation"] == [{"kernel": "solvers.kernels.a.b", "seconds": 2.0}]
-    assert "a.b 2.0" in found.sections[0].text
 
 
 def test_a_process_is_measured_and_one_that_fails_is_named():

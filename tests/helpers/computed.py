@@ -23,8 +23,10 @@ import scenarios
 import solvers
 from hierarchy import Hierarchy, HierarchyError, Robot, Stack, State, paths, tasks
 from hierarchy.avoidance import Barrier
+from hierarchy.task import Rows
 from hierarchy.tasks.joints.joint_limits import StepLimits
 from hierarchy.tasks.joints.mechanism import Mechanism, model_rows
+from hierarchy.tasks.together import TangentCone
 from scenarios.cell.published import PublishedAvoidance
 from scenarios.measure.goals import goals
 from scenarios.measure.metrics import measure
@@ -333,6 +335,10 @@ def odd():
         h.upper[0] = h.lower[0]
         res = make(name).solve(h)
         found[f"{name} {of} {bad}"] = [res.status.name, res.x]
+    cone = TangentCone(TASKS["cone"])
+    for k, (q, v) in enumerate(states(9)):
+        state = state_at(q, v)
+        found[f"cone {k}"] = [cone.reference_velocity(state), cone.jacobian(state)]
     (q, v), ball = states(1)[0], Robot.load(FOLDER.parent / "robots" / "odd.xml")
     lagging, alone = state_at(q, v, differences=1e-3), make("tpm")
     wrong = PublishedAvoidance(ROBOT.control_points, 1)
@@ -343,7 +349,9 @@ def odd():
             lambda: wrong.jacobian_derivative(lagging),
             lambda: wrong.jacobian_derivative(state_at(q, v)),
             lambda: [*steps.box(lagging), steps.error(lagging)], lambda: CONTACTS.forces(v),
-            lambda: [SetBased(inner=alone).label],
+            lambda: [SetBased(inner=alone).label], lambda: TangentCone(TASKS["pointing"]),
+            lambda: cone.writer(state, "acceleration", Rows.empty(1, 7)),
+            lambda: [cone.name, cone.kind, cone.dimension],
             lambda: str(Comparison(runs, "compare", {})), lambda: repr(ellipse),
             lambda: [*ball.position_limits(), ball.missing])):
         try:

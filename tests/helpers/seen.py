@@ -17,6 +17,7 @@ import os
 import re
 import shlex
 import tempfile
+import warnings
 import zipfile
 from functools import cache, partial
 from importlib.metadata import version
@@ -24,12 +25,16 @@ from pathlib import Path
 from types import SimpleNamespace
 from unittest.mock import patch
 
+import computed
+import computed_bench
+import computed_runs
 import numpy as np
 import typer.main
-from computed import COMPUTED
+from hand_made import recording
 from matplotlib.colors import to_hex
 from matplotlib.ticker import ScalarFormatter
 from pinned import FOLDER, robot_facts
+from unplugged import unplugged
 
 from hierarchy import HierarchyError, Robot, Task, jit, plugins, tasks
 from scenarios import Scenario, load, load_run, shipped, simulate
@@ -40,7 +45,7 @@ from scenarios.cli import doctor, runs, terminal
 from scenarios.cli.main import run_command
 from scenarios.config.distributions import Distribution
 from scenarios.draw import replay
-from scenarios.draw.figures import drawing, letter, palette
+from scenarios.draw.figures import drawing, letter, palette, picture, timeline
 from scenarios.draw.viewer import live, live_page
 from scenarios.loop import controller, faults
 from scenarios.measure import run_folder, safety
@@ -56,6 +61,7 @@ from solvers.problems import Recipe, bounded, generate, structured
 from solvers.qp import backends
 
 ROOT = FOLDER.parents[2]
+COMPUTED = computed.COMPUTED | computed_runs.COMPUTED | computed_bench.COMPUTED
 ROBOTS = [*sorted((FOLDER.parent / "robots").glob("*.xml")),
           *sorted((ROOT / "examples" / "robots").iterdir())]
 GROUPS = {file.stem: file.read_text(encoding="utf-8").splitlines()
@@ -64,7 +70,7 @@ GROUPS = {file.stem: file.read_text(encoding="utf-8").splitlines()
 RUNS = {"ellipse": 0.2, "ellipse-hqp": 0.2, "dual-arm": 0.1, "human-hqp": 0.1, "wipe": 0.05,
         "reach-torque-smooth": 0.02}
 PLAIN = ("run ellipse", "run ellipse-hqp", "run dual-arm", "keys", "problems", "commands plain",
-         *(f"computed {name}" for name in COMPUTED))
+         *(f"computed {name}" for name in COMPUTED if name != "doubts"))
 # What `hierarchy doctor` finds: names of modules of Python.
 REQUIRED = ("json>=2", "calendar>=9", "csv", "string<2", "none>=3", "wave; sys_platform=='no'",
             *(f"{name}; extra == '{extra}'" for name, extra in (
@@ -164,6 +170,30 @@ def seen_of_answers():
     return found
 
 
+def seen_of_figures():
+    """Of figures of the letter, of runs by hand: pairs, one tick, names of joints as formulas."""
+    names = ("ellipse-35deg-equality", "ellipse", "ellipse-velocity", "ellipse-35deg", "ellipse-3d")
+    runs = [recording(load(name), v=np.full((5, 7), float(i)), active_control_point=np.full(5, 2))
+            for i, name in enumerate(names)]
+    speeds = letter.PANEL["joint-velocities"]
+    for name in ("_{}", r"${}\q$"):
+        run = recording()
+        robot = dataclasses.replace(run.facts.robot, velocity_names=[*map(name.format, range(7))])
+        runs.append(dataclasses.replace(run, facts=dataclasses.replace(run.facts, robot=robot)))
+    pushed = load("humanoid-reach", {"control.duration": 0.01})
+    pair = [simulate(pushed)]
+    pair.append(dataclasses.replace(pair[0], signals={
+        **pair[0].signals, "v": np.roll(pair[0]["v"], 9, axis=1)}))  # a joint has one colour
+    return {**{f"{len(of)} {name}": figure_facts(fig) for of in (
+                runs[:5], runs[2:3], [recording(t=[0.0, 1.0])], [recording(t=[0.0])])
+               for name, fig in letter.figures(of)}, "one tick": figure_facts(
+                   timeline.timeline(recording(t=[2.0]))), "joints": [
+                figure_facts(letter.stacked([(run, [speeds]) for run in of], ""))
+                for of in ([runs[5]], [runs[6]], pair)],
+            "no tick": figure_facts(recording(t=[]).plot()),
+            "nearest": picture._nearest(recording(minimal_distance=[2.0, np.nan, 1.0, 2.0, 2.0]))}
+
+
 SCENES = ((physics, physics.scene), (torque, torque.on_floor))
 
 
@@ -220,7 +250,8 @@ def seen_of_commands(group):
     """Of the commands of a group: exit codes, what they print and write, figures, runs."""
     found, here = {}, Path.cwd()
     with (tempfile.TemporaryDirectory() as folder, patch.dict(os.environ, {"COLUMNS": "100"}),
-          steadily() as drawn):
+          steadily() as drawn, unplugged(), warnings.catch_warnings(record=True) as warned):
+        warnings.simplefilter("always", UserWarning)
         os.chdir(folder)
         try:
             for line in filter(None, GROUPS[group]):
@@ -229,7 +260,9 @@ def seen_of_commands(group):
                 with (contextlib.redirect_stdout(printed), contextlib.redirect_stderr(printed),
                       patch("sys.argv", ["hierarchy", *shlex.split(command)])):
                     code = run_command(shlex.split(command))
-                found[line] = [code, _cleaned(printed.getvalue())]
+                found[line] = [code, _cleaned(printed.getvalue()),
+                               *(str(one.message) for one in warned)]
+                warned.clear()
             found["written"] = {str(file): _written(file) for file in sorted(Path().rglob("*"))
                                 if "worst" not in file.parts}
         finally:
@@ -396,7 +429,9 @@ PARTS = {**{f"run {name}": partial(seen_of_run, name) for name in RUNS},
          "answers": seen_of_answers, "live page": partial(seen_of_live_page, "ellipse"),
          "live page of a cone": partial(seen_of_live_page, "ellipse", position=None,
                                         avoidance=None),
-         "keys": seen_of_keys, "problems": seen_of_problems, "robots": seen_of_robots}
+         "live page of a table": partial(seen_of_live_page, "wipe"),
+         "keys": seen_of_keys, "figures": seen_of_figures,
+         "problems": seen_of_problems, "robots": seen_of_robots}
 
 
 def seen(part):

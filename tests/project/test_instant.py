@@ -2,7 +2,6 @@
 
 import os
 import re
-import shlex
 import shutil
 import subprocess
 import sys
@@ -42,36 +41,44 @@ def compiled(code, folder, **settings):
     return sorted(path.name for path in kept.rglob("*") if path.is_file() and path.suffix != ".o")
 
 
-def test_the_program_of_the_readme_compiles_nothing(tmp_path):
-    blocks = re.findall(r"```python\n(.*?)```", (ROOT / "README.md").read_text(), re.DOTALL)
-    [program] = [block for block in blocks if "solve_ik" in block]
-    assert compiled(program, tmp_path) == []
+[README] = [block for block in re.findall(
+    r"```python\n(.*?)```", (ROOT / "README.md").read_text(), re.DOTALL) if "solve_ik" in block]
+COMMANDS = ["run ellipse --resolver recursive --set pointing.alpha_d=35 --duration 0.1",
+            "run ellipse --duration 0.1", "run human --duration 0.1",
+            "run reach-torque --duration 0.01", "library --resolvers recursive",
+            "compare ellipse ellipse-velocity --resolvers tpm,recursive,hqp,weighted --workers 1 "
+            "--set control.duration=0.02"]
+PROGRAMS = {"of the readme": README, "of commands": f"""
+from scenarios.cli.main import run_command
+for i, command in enumerate({COMMANDS}):
+    assert run_command([*command.split(), "--out", str(i)]) < 2
+""", "of every kind of task": """
+from hierarchy import Stack
+from hierarchy.avoidance import Barrier
+from hierarchy.tasks import SelfSeparation
+from scene import ROBOT, TASKS, state_at, states
+apart = SelfSeparation(ROBOT.capsules, Barrier(0.01))
+apart.distances(state_at(*states(1)[0]))
+for task in [*TASKS.values(), apart]:
+    for level in "velocity", "acceleration":
+        Stack([task], level).hierarchy(state_at(*states(1)[0]))
+""", "beside an array of gigabytes": """
+import numpy as np
+from hierarchy import Hierarchy, Robot, State
+from solvers import make
+robot = Robot.load("kuka_lwr")
+large = np.empty(3 * 2**27)  # code and its constants came to lie on both sides of it
+h = Hierarchy.from_levels([([[1.0, 0.0]], [1.0]), (np.eye(2), [0.0, 2.0])])
+for name in ("hcod", "tpm", "reverse"):
+    assert np.abs(make(name).solve(h).x - [1.0, 2.0]).max() < 1e-12
+assert np.isfinite(State.at(robot, robot.rest).q).all()
+"""}
 
 
-def test_commands_compile_nothing(tmp_path):
-    commands = [
-        "run ellipse --resolver recursive --set pointing.alpha_d=35 --duration 0.1",
-        "run ellipse --duration 0.1", "run human --duration 0.1",
-        "run reach-torque --duration 0.01", "library --resolvers recursive",
-        "compare ellipse ellipse-velocity --resolvers tpm,recursive,hqp,weighted --workers 1 --set "
-        "control.duration=0.02"]
-    words = [[*shlex.split(command), "--out", str(tmp_path / str(i))]
-             for i, command in enumerate(commands)]
-    code = ("from scenarios.cli.main import run_command\n"
-            f"assert max(map(run_command, {words})) < 2")
-    assert compiled(code, tmp_path) == []
-
-
-def test_no_kind_of_task_compiles_anything(tmp_path):
-    code = ("from hierarchy import Stack\nfrom hierarchy.avoidance import Barrier\n"
-            "from hierarchy.tasks import SelfSeparation\n"
-            "from scene import ROBOT, TASKS, state_at, states\n"
-            "apart = SelfSeparation(ROBOT.capsules, Barrier(0.01))\n"
-            "apart.distances(state_at(*states(1)[0]))\n"
-            "for task in [*TASKS.values(), apart]:\n"
-            "    for level in 'velocity', 'acceleration':\n"
-            "        Stack([task], level).hierarchy(state_at(*states(1)[0]))")
-    assert compiled(code, tmp_path, PYTHONPATH=f"{ROOT}:{ROOT / 'tests' / 'helpers'}") == []
+@pytest.mark.parametrize("program", PROGRAMS)
+def test_a_program_compiles_nothing(program, tmp_path):
+    path = f"{ROOT}:{ROOT / 'tests' / 'helpers'}"
+    assert compiled(PROGRAMS[program], tmp_path, PYTHONPATH=path) == []
 
 
 def test_another_processor_makes_code_once_and_compiles_nothing(tmp_path):
@@ -83,18 +90,6 @@ def test_another_processor_makes_code_once_and_compiles_nothing(tmp_path):
         assert compiled(code, tmp_path, TASK_HIERARCHY_NATIVE="1", NUMBA_CPU_NAME="generic") == []
         [made] = (tmp_path / "cache" / "task-hierarchy").iterdir()
         assert re.fullmatch(r"solvers-\w+\.o", made.name)
-
-
-def test_kernels_load_beside_arrays_of_gigabytes(tmp_path):
-    """Code and its constants came to lie on both sides of one; LLVM ended the process."""
-    code = ("import numpy as np\nfrom hierarchy import Hierarchy, Robot, State\n"
-            "from solvers import make\nrobot = Robot.load('kuka_lwr')\n"
-            "large = np.empty(3 * 2**27)\n"
-            "h = Hierarchy.from_levels([([[1.0, 0.0]], [1.0]), (np.eye(2), [0.0, 2.0])])\n"
-            "for name in ('hcod', 'tpm', 'reverse'):\n"
-            "    assert np.abs(make(name).solve(h).x - [1.0, 2.0]).max() < 1e-12\n"
-            "assert np.isfinite(State.at(robot, robot.rest).q).all()\n")
-    assert compiled(code, tmp_path) == []
 
 
 @pytest.mark.parametrize("part", PARTS)

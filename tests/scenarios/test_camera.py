@@ -27,8 +27,6 @@ from scenarios.config.sections.sensor import CameraSection, ImageSection
 
 STATE = State.at(ROBOT, [0.9, -0.9, 0.9, 1.2, 1.0, 1.8, 0.0])
 SMALL = {"width": 80, "height": 60, "fx": 70.0, "fy": 65.0}
-EXACT = {"noise_floor": 0.0, "noise_growth": 0.0, "rounding": "step", "step": 0.0, "missing": 0.0,
-         "missing_at_edges": 0.0, "outliers": 0.0}
 IDEAL = {"ideal": True, "near": 0.0, "far": 1e9}
 SHAPES = {
     "sphere": Obstacle("sphere", (0.1, 0.0, 2.0), (0.3,)),
@@ -84,17 +82,6 @@ def test_every_pixel_has_the_depth_at_which_its_ray_meets_the_shape(name):
         assert seen[i, j] == pytest.approx(traced(SHAPES[name], pinhole, j, i), rel=2e-6), (i, j)
 
 
-@pytest.mark.parametrize(("rounding", "step"), [("step", 0.01), ("disparity", 2.85e-3)])
-def test_rounding_is_to_steps_of_the_depth_or_of_its_inverse_and_bounded(rounding, step):
-    errors = EXACT | {"rounding": rounding, "step": step}
-    seen, true = (depths(camera(SHAPES["sphere"], errors=one)) for one in (errors, IDEAL))
-    power = 1.0 if rounding == "step" else -1.0
-    steps, exact = (one[true > 0] ** power / step for one in (seen, true))
-    np.testing.assert_allclose(steps, np.rint(steps), atol=2e-3)
-    assert len(np.unique(steps)) > 3
-    np.testing.assert_allclose(steps, exact, rtol=0.0, atol=0.5 + 1e-3)
-
-
 @pytest.mark.parametrize("depth", [1.0, 3.0])
 def test_noise_has_the_stated_size_and_a_bound(depth):
     errors = {"step": 0.0, "missing": 0.0, "missing_at_edges": 0.0, "outliers": 0.0}
@@ -103,37 +90,6 @@ def test_noise_has_the_stated_size_and_a_bound(depth):
     assert abs(off.mean()) < 0.05 * sigma
     assert off.std() == pytest.approx(sigma, rel=0.05)
     assert np.abs(off).max() <= 3.5 * sigma + 1e-6
-
-
-def test_pixels_are_missing_at_random_and_more_so_at_edges():
-    errors = {"missing": 0.1, "missing_at_edges": 0.5, "outliers": 0.0}
-    assert (depths(wall(errors=errors)) == 0).mean() == pytest.approx(0.1, abs=0.02)
-    scene = camera(Obstacle("sphere", (0.0, 0.0, 2.0), (0.5,)), backdrop=4.0, errors=errors)
-    missing = np.mean([scene.image(i, STATE)[0] == 0 for i in range(40)], axis=0)
-    steps = np.abs(np.diff(scene.scene.astype(float), axis=1)) > 0.05
-    edge = np.pad(steps, ((0, 0), (1, 0))) | np.pad(steps, ((0, 0), (0, 1)))
-    assert missing[edge].mean() == pytest.approx(0.5, abs=0.05)
-
-
-def test_outliers_are_nearer_and_come_in_their_share_of_frames():
-    scene = wall(errors=EXACT | {"outliers": 0.3})
-    seen = [scene.image(i, STATE)[0].copy() for i in range(200)]
-    sizes = [np.count_nonzero(reading != 2.0) for reading in seen]
-    assert np.mean(np.array(sizes) > 0) == pytest.approx(0.3, abs=0.1)
-    assert set(sizes) >= {0, 1, 9, 25}
-    assert max(sizes) == 25
-    assert 0.5 <= np.min(seen) <= np.max(seen) == 2.0
-
-
-def test_jitter_delays_each_frame_by_less_than_its_most_and_by_the_seed():
-    late, same, other = (camera(rate=30.0, jitter=0.02, seed=seed) for seed in (3, 3, 4))
-    times = np.array([late.time(i) for i in range(100)])
-    waits = times - np.arange(100) / 30.0
-    assert waits.min() >= 0.0
-    assert 0.015 < waits.max() < 0.02
-    assert [late.newest(t) for t in times] == list(range(100))
-    assert [late.newest(t - 1e-6) for t in times] == list(range(-1, 99))
-    assert same.time(5) == times[5] != other.time(5)
 
 
 def test_a_camera_faces_what_it_looks_at_with_the_middle_of_its_pixels():
@@ -308,19 +264,6 @@ def test_frames_that_cannot_be_used_are_refused_by_name(tmp_path):
         for png in folder.glob("*.png"):
             (tmp_path / png.name).write_bytes(png.read_bytes())
         refused(said, RecordedFrames, tmp_path, ROBOT)
-
-
-@pytest.mark.parametrize(("name", "kind"), [("human", "no_frames"), ("human-hqp", "dark_frames")])
-def test_a_blind_camera_leads_to_the_policy_for_stale_measurements(name, kind):
-    """Frames at 0, 1/30, 2/30 s, then none up to 0.4 s; blind is 0.1 s after the last."""
-    run = simulate(load(name, [*QUICK, "sensor.stale_after=0.1", "start.v=[0.1,0,0,0,0,0,0]",
-                               f"faults=[{{kind='{kind}', at=0.08, duration=0.32}}]"]))
-    assert run.fault is None
-    ticks = [event.tick for event in run.events if event.kind == "stale"]
-    assert ticks == list(range(ticks[0], 80))
-    assert ticks[0] in (35, 36)  # the last frame was taken in tick 14, at 0.07 s
-    assert np.abs(run["v"][79]).max() < 0.5 * np.abs(run["v"][ticks[0]]).max()
-    assert {event.action for event in run.events} == {"brake"}
 
 
 def test_an_obstacle_at_a_point_of_the_robot_is_refused_at_the_start():

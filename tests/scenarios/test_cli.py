@@ -12,11 +12,10 @@ import pytest
 from hand_made import recording
 
 from scenarios import compare, load, load_run, simulate
-from scenarios.cli import doctor, terminal
+from scenarios.cli import doctor
 from scenarios.cli.main import app
 from scenarios.files import OutputError, claim, in_runs, slug
 from scenarios.measure import run_folder
-from scenarios.measure.runs import Cell, Row
 from scenarios.results import comparing
 from scenarios.results.store import FullError
 
@@ -115,20 +114,6 @@ def test_a_comparison_that_ends_early_keeps_the_runs_that_ended_and_no_empty_fol
     assert f"{said}\n" in told
     assert len(list(tmp_path.rglob("run.npz"))) == kept
     assert (tmp_path / "b").exists() == ("runs" in told) == (kept > 0)
-
-
-def test_a_table_is_as_many_tables_as_80_columns_need(capsys):
-    cells = [Cell(f"{i}.5", "best" * (i == 2), more="[1, 2]" * (i < 2)) for i in range(5)]
-    terminal._print_rows([], "median", ["tpm", "hqp: form=slack", "weighted", "hcod", "recursive"],
-                         [Row("Joint speed, max", "rad/s", "", "", tuple(cells))], "best")
-    assert [line.rstrip() for line in capsys.readouterr().out.splitlines() if line.strip()] == """\
-                                        hqp:
-median                       tpm  form=slack weighted
-Joint speed, max [rad/s]     0.5         1.5     2.5*
-                          [1, 2]      [1, 2]
-median                   hcod recursive
-Joint speed, max [rad/s]  3.5       4.5
-* best""".splitlines()
 
 
 def test_the_shell_completes_commands_scenarios_and_resolvers(monkeypatch, capsys):

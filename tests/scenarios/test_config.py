@@ -1,25 +1,17 @@
 """Scenario files, their keys and variants; groups of scenarios and where their runs part."""
 
 import sys
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
-from hand_made import asked, recording
 
 import scenarios.config.reading as groups_of
 from hierarchy import HierarchyError
 from scenarios import compare
 from scenarios.config import Scenario, load, shipped
-from scenarios.config.distributions import flat
 from scenarios.config.reference import keys_of, sections
-from scenarios.config.resolvers import default_resolvers
-from scenarios.config.validation import _table
-from scenarios.measure.motions import motions, partings
-from scenarios.measure.runs import Run
 from scenarios.results.plan import load_sweep
-from solvers.qp import backends
 
 
 @pytest.mark.parametrize("name", shipped())
@@ -58,13 +50,6 @@ def test_a_file_is_beside_the_one_that_names_it_or_in_the_working_directory_of_a
         assert keys["robot.model"].choice == (f"{tmp_path}/a.urdf", "kuka_lwr")
         assert keys["a.path.file"].choice == (f"{tmp_path}/b",)
     assert found.with_changes({"robot.model": "c.urdf"}).robot.model == f"{tmp_path}/base/c.urdf"
-
-
-def test_tables_are_read_at_a_path_and_flattened_and_what_is_none_is_empty_or_stays():
-    assert (flat(3), flat({"a": {"b": {"around": 1}}})) == (3, {"a.b": {"around": 1}})
-    data = {"a": 3, "b": [{"c": 1}]}
-    assert [_table(data, path) for path in (["b", 0], ["a"], ["a", "d"], ["b", 1], [])] == [
-        {"c": 1}, {}, {}, {}, data]
 
 
 def test_waypoints_of_obstacles_vary_within_their_spread_and_half_the_time_beside_them():
@@ -106,60 +91,3 @@ def test_a_bad_group_is_an_error_that_names_it(text, says, tmp_path, monkeypatch
     (tmp_path / "mine.toml").write_text(text)
     with pytest.raises(HierarchyError, match=says):
         compare("mine")
-
-
-# Where strict resolvers part: the tick, and what was different before it.
-def run_of(spec, q=None, fault=None, **changed):
-    scenario, q = asked(spec), np.zeros((5, 7)) if q is None else q
-    return Run(scenario, spec, spec, recording(scenario, fault, q=q, **changed))
-
-
-def away_from(tick, by=1e-3):
-    q = np.zeros((5, 7))
-    q[tick:, 2] = by
-    return q
-
-
-def test_runs_that_are_one_motion_are_as_far_apart_as_the_farthest_of_them():
-    (one,) = motions([run_of("recursive"), run_of("hqp", away_from(1, 5e-6)),
-                      run_of("hcod", away_from(1, 2e-6))])
-    assert (one.labels, one.apart) == (("recursive", "hqp", "hcod"), 5e-6)
-    (one,) = partings([run_of("recursive"), run_of("hqp", away_from(1, 5e-7))])
-    assert str(one) == "hqp stays within 5.0e-07 rad of recursive to the end"
-
-
-NOT_SOLVED = 3 * np.eye(5, dtype=int)  # at tick 0, 1, ...
-
-
-@pytest.mark.parametrize(("other", "tick", "why"), [
-    ({"q": away_from(3)}, 3, "the motion magnifies the errors of each tick (declared: 1e-06)"),
-    ({"q": away_from(3), "status": NOT_SOLVED[3]}, 3, "tick 3 of hqp was not solved"),
-    ({"q": away_from(3), "status": NOT_SOLVED[4]}, 3, "magnifies"),
-    ({"q": away_from(3), "order": np.array([0, 1, 0, 0, 0])}, 3, "another one at tick 1"),
-    ({"q": away_from(2, np.nan)}, 2, "")])
-def test_runs_part_at_a_tick_for_a_reason_that_is_not_after_it(other, tick, why):
-    (one,) = partings([run_of("recursive"), run_of("hqp", **other)])
-    assert (one.tick, one.largest) == (tick, np.inf if tick == 2 else 1e-3)
-    assert f"at tick {tick} ({tick}.00 s), by " in str(one)
-    assert why in one.why
-
-
-@pytest.mark.parametrize("units", [("m",) * 7, ("rad", *("m",) * 6)])
-def test_runs_of_joints_that_slide_part_by_metres(units):
-    runs = [run_of("recursive"), run_of("hqp", away_from(3))]
-    for run in runs:
-        facts = run.recording.facts
-        robot = replace(facts.robot, velocity_units=units)
-        vars(run.recording)["facts"] = replace(facts, robot=robot)
-    unit = " or ".join(dict.fromkeys(units))
-    (one,) = partings(runs)
-    assert f"by more than 1e-06 {unit} at tick 3 (3.00 s), by 0.001 {unit} at most" in str(one)
-
-
-def test_a_backend_that_is_not_installed_leaves_the_default_comparison_and_is_named(monkeypatch):
-    everything, nothing = default_resolvers()
-    assert not nothing
-    monkeypatch.setattr(backends, "installed", lambda name: name != "daqp")
-    rest, missing = default_resolvers()
-    assert set(everything) - set(rest) == {"hqp:backend=daqp"}
-    assert missing == {"hqp:backend=daqp": "pip install 'task-hierarchy[qp]'"}

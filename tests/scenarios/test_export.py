@@ -6,12 +6,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from refusals import refused
-from scipy.spatial.transform import Rotation
 
-from hierarchy import Robot, State
-from hierarchy.avoidance import Obstacle
 from scenarios import load, simulate
-from scenarios.export import _bytes, export, foxglove
+from scenarios.export import _bytes, export
 from scenarios.recording.recording import Event
 
 
@@ -83,40 +80,7 @@ def test_what_is_no_number_in_json_is_not_written():
         _bytes({"x": [1.0, np.inf]})
 
 
-def test_frames_are_where_the_robot_is(run, messages):
-    found, _, _ = messages
-    robot = Robot.named("kuka_lwr")
-    for at, message in found["/tf"]:
-        frames = {one["child_frame_id"]: one for one in message["transforms"]}
-        tick = int(np.abs(run["t"] - at * 1e-9).argmin())
-        state = State.at(robot, run["q"][tick])
-        placed = [*frames["end_effector"]["translation"].values()]
-        np.testing.assert_allclose(placed, run["ee_position"][tick], atol=1e-9)
-        np.testing.assert_allclose([*frames["desired"]["translation"].values()],
-                                   run["desired_position"][tick], atol=1e-9)
-        for i, name in enumerate(robot.joint_names, 1):
-            np.testing.assert_allclose([*frames[name]["translation"].values()],
-                                       state.placements[i, 9:], atol=1e-12)
-            turned = Rotation.from_quat([frames[name]["rotation"][axis] for axis in "xyzw"])
-            np.testing.assert_allclose(turned.as_matrix(),
-                                       state.placements[i, :9].reshape(3, 3).T, atol=1e-9)
-
-
 def test_without_its_package_nothing_is_exported(run, tmp_path, monkeypatch):
     refused("to_dataframe", export, run, tmp_path / "run.parquet")
     monkeypatch.setattr("scenarios.export.find_spec", lambda name: None)
     refused("pip install 'task-hierarchy[export]'", export, run, tmp_path / "run.mcap")
-
-
-@pytest.mark.parametrize(("shape", "size", "part", "drawn", "spheres"), [
-    ("box", (0.1, 0.2, 0.3), "cubes", [0.2, 0.4, 0.6], 0),
-    ("capsule", (0.05, 0.2), "cylinders", [0.1, 0.1, 0.4], 2),
-    ("point", (), "spheres", [0.02] * 3, 1)])
-def test_every_shape_of_an_obstacle_is_drawn_at_its_size(shape, size, part, drawn, spheres):
-    made = foxglove.obstacle(0.0, 0, Obstacle(shape, (1.0, 2.0, 3.0), size), np.array([1., 2, 3]))
-    np.testing.assert_allclose([*made[part][0]["size"].values()], drawn)
-    assert len(made["spheres"]) == spheres
-
-
-def test_a_capsule_without_length_is_two_balls():
-    assert [*foxglove._capsule(np.ones(3), np.ones(3), 0.5, foxglove._ARM)] == ["spheres"]

@@ -15,9 +15,8 @@ from hierarchy.tasks import JointCoupling, Mechanism, Position, Posture
 from scenarios import simulate
 from scenarios.cell.build import build
 from scenarios.cell.plants.torque import TorqueRobot
-from scenarios.config import Scenario, ScenarioError
+from scenarios.config import Scenario
 from scenarios.config.sections.plant import TorqueSection
-from scenarios.loop.first_tick import first_tick
 from solvers import solve_ik
 
 
@@ -155,24 +154,6 @@ def test_a_mechanism_that_nothing_drives_keeps_its_energy():
         plant.act(np.zeros(5))
     after = pin.computeMechanicalEnergy(model, model.createData(), plant.q, plant.v)
     assert abs(after - before) < 0.04
-
-
-def test_the_mechanism_is_the_first_level_and_bounds_of_a_resolver_of_bounds_come_before():
-    for settings, levels in (
-            (LIMITS, ("mechanism", "joint limits", "posture")),
-            ({"resolver": "tpm", **LIMITS}, ("joint limits", "mechanism", "posture")),
-            ({"stack": "switched", "level": "acceleration"}, ("mechanism", "position"))):
-        assert first_tick(scenario(**settings)).levels == levels
-
-
-def test_a_start_is_closed_where_it_names_no_joint_and_refused_where_it_cannot_be():
-    cell = build(scenario())
-    assert largest_gap(cell.start[0][None]) < 1e-12
-    assert cell.robot.values(cell.start[0])["crank"] == pytest.approx(-0.8, abs=1e-15)
-    with pytest.raises(ScenarioError, match=r"start: pin .*: the robot's mechanism stays open by"):
-        build(scenario(start={"joints": {"crank": 0.0, "rocker": 2.0}}))
-    with pytest.raises(ScenarioError, match=r"start: joint 'crank': its \(cos, sin\)"):
-        build(scenario(start={"q": [2.0, 0.0, 0.0, 0.0, 0.0, 0.0]}))
 
 
 def test_joints_of_a_mechanism_that_a_posture_names_reach_their_values():

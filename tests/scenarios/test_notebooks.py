@@ -8,11 +8,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from headless import Balanced
 from refusals import refused
 
-from hierarchy.notebook import html_table
-from scenarios import compare, load, simulate
+from scenarios import load, simulate
 
 NOTEBOOKS = sorted((Path(__file__).parents[2] / "docs" / "notebooks").glob("*.ipynb"))
 
@@ -20,32 +18,6 @@ NOTEBOOKS = sorted((Path(__file__).parents[2] / "docs" / "notebooks").glob("*.ip
 @pytest.fixture(scope="module")
 def run():
     return simulate(load("ellipse", ["control.duration=0.02"]))
-
-
-def test_a_table_escapes_every_value_marks_the_best_and_says_how_much_is_left_out():
-    text = html_table("<b>", ("a&b",), [("<i>",), (2,)], best={(1, 0)})
-    for shown in ("&lt;b&gt;", "a&amp;b", "<td>&lt;i&gt;</td>", "<td><b>2</b></td>"):
-        assert shown in text
-    assert "<b>" not in html_table("t", ("n",), [(1,)])
-    assert "... and 70 more" in html_table("t", ("n",), [(i,) for i in range(100)])
-    assert "more" not in html_table("t", ("n",), [(i,) for i in range(30)])
-
-
-def test_a_recording_shows_its_signals_and_a_comparison_a_column_for_each_run(run):
-    cells = Balanced(run._repr_html_()).cells
-    assert {"scenario", "resolver", "position_error", "20 x 7"} <= set(cells)
-    cells = Balanced(compare([run.scenario], ["tpm", "recursive"])._repr_html_()).cells
-    assert "recursive" in cells
-    assert any(cell.startswith("Position error, rms [") for cell in cells)
-
-
-def test_plot_draws_a_panel_for_each_signal_with_its_unit(run):
-    figure = run.plot("q", "position_error", "order")
-    assert [ax.get_ylabel() for ax in figure.axes] == ["q [rad]", "position_error [m]", "order"]
-    assert [len(ax.lines) for ax in figure.axes] == [7, 3, 1]
-    np.testing.assert_array_equal(figure.axes[0].lines[3].get_ydata(), run["q"][:, 3])
-    assert len(run.plot().axes) >= 3
-    assert figure._repr_png_().startswith(b"\x89PNG")  # what a notebook shows
 
 
 @pytest.mark.parametrize("library", ["pandas", "polars"])

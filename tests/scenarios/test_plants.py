@@ -1,20 +1,17 @@
 """Plants: exact or simulated physics, what is measured of them, and what is true."""
 
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
 from scene import FRAME, ROBOT, place_of
 
-from hierarchy import Hierarchy, State
+from hierarchy import State
 from hierarchy.avoidance import Obstacles
 from scenarios import load, simulate
 from scenarios.cell.build import build
 from scenarios.cell.plants import Apart, JointSensor, KinematicArm, PhysicsArm
 from scenarios.config.sections.plant import MeasurementSection, PhysicsSection
-from scenarios.loop.audit import ActiveSets
 from scenarios.loop.controller import Controller
-from solvers import Resolution, Status, make
 
 START = np.array([0.923, -0.854, 0.903, 1.195, 0.971, 1.796, 0.0])
 STILL = np.zeros(7)
@@ -153,29 +150,3 @@ def test_true_distances_are_on_record_beside_the_measured(name, changes, centre,
         assert run["true_ee_distance"][k] == pytest.approx(wanted[-1], abs=1e-12)
         assert run["true_minimal_distance"][k] == pytest.approx(wanted[:-1].min(), abs=1e-12)
     assert np.abs(run["true_ee_distance"] - run["ee_distance"]).max() > 1e-3
-
-
-def bounded(target):
-    """One unknown in a box of its own, and one that is asked for in vain beyond it."""
-    return Hierarchy.from_levels([(np.eye(2), -np.ones(2), np.ones(2)), (np.eye(2), target)],
-                                 names=("box", "task"))
-
-
-@pytest.mark.parametrize("resolver", ["hcod", "tpm", "sns", "weighted"])
-def test_a_row_acts_where_its_side_holds_the_task_back(resolver):
-    sets, asked = ActiveSets(), [(0, 0.5), (2, 0.5), (3, 0.5), (-2, 0.5), (-2, 5), (0.2, 0.1)]
-    found = [sets.number(h, make(resolver).solve(h)) for h in map(bounded, asked)]
-    assert found == [0, 1, 1, 2, 3, 0]
-
-
-def test_a_tick_without_an_answer_or_without_a_report_has_no_set():
-    sets, h = ActiveSets(), bounded((2.0, 0.5))
-    tick = SimpleNamespace(hierarchy=h, resolution=Resolution(np.zeros(2)))
-    assert sets(0, tick) == {}
-    tick.resolution = make("hcod").solve(h)
-    assert sets(1, tick) == {"active_set": 0}
-    more = Hierarchy.from_levels([([[0.0, 1.0]], [0.5]), *h.levels()], names=("more", *h.names))
-    assert sets.number(more, make("hcod").solve(more)) == 0, "a level more is no change"
-    tick.resolution = make("hcod").solve(h)
-    tick.resolution.status = Status.ITERATION_LIMIT
-    assert sets(2, tick) == {"active_set": -1}

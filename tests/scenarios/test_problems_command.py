@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 from rank_cases import solved
 
-from hierarchy import Hierarchy
 from scenarios.problems import recorded
 from scenarios.problems.families import FAMILIES, available, export, family, save
 from scenarios.problems.made import posed
@@ -32,51 +31,6 @@ def test_a_file_without_problems_is_described(command, tmp_path):
     Collection(Head("none", "", "fresh", 1), (), ()).save(tmp_path / "none.npz")
     said = command("problems show", tmp_path / "none.npz").out
     assert re.search(r"^unknowns +none$", said, re.MULTILINE)
-
-
-def test_ticks_of_the_humanoid_are_ten_in_a_row_after_its_push_of_runs_that_last(monkeypatch):
-    asked = []
-
-    def window(scenario, first, count):
-        asked.append((scenario.control.period * first, scenario.plant, scenario.limits.horizon))
-        return [Hierarchy.from_levels(
-            [(np.eye(3)[:1], [k]), (np.eye(3)[:2], [7.0, 7.0]), (np.eye(3)[2:], [1.0])],
-            names=("a", recorded.LEFT_OUT, "b")) for k in range(count - (len(asked) == 2))]
-
-    monkeypatch.setattr(recorded, "window", window)
-    found = recorded.fresh("DYN60", 60, 12)
-    assert [one.h.names for one in found] == [("a", "b")] * 12
-    assert [[*one.proof.x.round(9), one.proof.complete] for one in found] == [
-        [k % 10, 0.0, 1.0, True] for k in range(12)]
-    assert [one.before is found[k - 1].h for k, one in enumerate(found)] == [
-        k not in (0, 10) for k in range(12)]
-    assert len({at for at, *_ in asked}) == len(asked) == 3
-    for at, plant, horizon in asked:
-        assert 0.3 <= at < 1.0
-        assert not any((plant.stops, horizon, plant.joint_friction, plant.joint_damping,
-                        plant.armature))
-
-
-def test_a_window_begins_at_the_tick_of_its_seed_in_the_first_run_that_lasts(monkeypatch):
-    asked = []
-
-    def window(scenario, first, count):
-        asked.append((first, tuple(scenario.start.q)))
-        return [None] * (count - (len(asked) in (2, 3)))
-
-    monkeypatch.setattr(recorded, "window", window)
-    for seed in (0, 3, 4):
-        assert recorded.recorded("ellipse-limits", seed, 2) == [None, None]
-    assert [first for first, _ in asked] == [7540, 3047, 3047, 3047, 9393]
-    assert len({q for _, q in asked}) == 5
-
-
-def test_a_run_that_ends_before_its_window_is_an_error(monkeypatch):
-    from scenarios.config import ScenarioError
-
-    monkeypatch.setattr(recorded, "uninterrupted", lambda *_, **__: None)
-    with pytest.raises(ScenarioError, match="ellipse-limits: no run with seed 3 has 2 problems"):
-        recorded.recorded("ellipse-limits", 3, 2)
 
 
 def test_check_finds_an_answer_that_is_not_proved(command, tmp_path):

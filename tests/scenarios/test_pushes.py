@@ -4,70 +4,12 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from hand_made import recording as hand_made
 
 from scenarios import load, simulate
 from scenarios.cell.build import build
-from scenarios.draw.replay import html
-from scenarios.draw.viewer.live import Live
 from scenarios.loop.controller import Controller
 from scenarios.measure.judging import judge
-from scenarios.recording.fate import Fate, levels_at, row_units
-from scenarios.recording.listed import errors
-from scenarios.scene.drawn import scene
-
-
-@pytest.mark.parametrize("name", ["reach-torque", "stand-momentum", "wipe", "step", "crawl"])
-def test_every_shipped_scenario_of_torques_can_be_replayed(name):
-    """A level of momentum had no name for its curve; a position in two axes had three."""
-    pytest.importorskip("mujoco")
-    run = simulate(load(name).with_changes({"control.duration": 0.01}))
-    names = [one.name for one in scene(run).series]
-    assert len(set(names)) == len(names)
-    assert "</html>" in html({"a": run}, name)
-    live = Live(run.scenario)
-    live.tick()
-    for now, path in zip(live.frame().paths, scene(run).paths, strict=True):
-        np.testing.assert_allclose(now.actual[0], path.actual[0], atol=1e-9)
-        assert (now.wanted is None) == (path.wanted is None)
-        if name == "wipe":
-            assert (scene(run).pushes.table[..., 2] == load(name).plant.height).all()
-        if path.wanted is not None:
-            np.testing.assert_allclose(now.wanted[0], path.wanted[0], atol=1e-9)
-
-
-@pytest.mark.parametrize(("units", "all_of_them", "two"), [
-    (["rad"] * 7, "rad", "rad"), (["m"] * 7, "m", "m"), (["m"] * 6 + ["rad"], "", "m")])
-def test_tasks_of_joints_have_their_unit_and_none_where_those_differ(units, all_of_them, two):
-    """Those of joints that slide were said to be missed by so many rad/s², and off by rad."""
-    tasks = [{"kind": "coupling", "joints": {"joint_1": 1.0, "joint_2": 1.0}},
-             {"kind": "posture"}]
-    run = simulate(load("ellipse-hqp", {"control.duration": 0.002, "tasks": tasks}))
-    robot = replace(run.facts.robot, velocity_units=tuple(units))
-    run = replace(run, facts=replace(run.facts, robot=robot))
-    levels = levels_at(run, [0])
-    said = dict(zip(levels.names, levels.units, strict=True))
-    expected = {"joint limits": all_of_them, "coupling": two, "posture": all_of_them}
-    assert {name: said[name] for name in expected} == {
-        name: unit and f"{unit}/s²" for name, unit in expected.items()}
-    del expected["joint limits"]
-    assert {section.title: unit for section, unit, _ in errors(run)} == expected
-
-
-def test_a_cone_and_a_direction_have_no_unit():
-    """Their levels were said to be missed by so many m/s²."""
-    tasks = [{"kind": "look-at", "frame": "tool", "target": [1.0, 0.0, 0.0]},
-             {"kind": "pointing", "frame": "tool", "axis": [0.0, 0.0, 1.0], "alpha_d": 20.0}]
-    scenario = load("ellipse-hqp", {"tasks": tasks, "pointing": None})
-    names = ["look-at", "pointing", "position"]
-    assert row_units(scenario, names, {}) == ("", "", "m/s²")
-
-
-def test_a_wrench_has_no_unit():
-    for target, unit in (([20.0], "N"), ([20.0] * 3, "N"), ([20.0] * 6, "")):
-        scenario = load("wipe", {"tasks.0.target": target})
-        assert row_units(scenario, ["force"], {}) == (unit,)
-
+from scenarios.recording.fate import Fate, levels_at
 
 NAMES = ("ellipse", "ellipse-velocity", "ellipse-published", "ellipse-limits", "ellipse-hqp")
 
@@ -104,18 +46,3 @@ def test_distances_that_are_not_those_recorded_leave_levels_unknown(recording):
     levels = levels_at(other, [0, 700])
     assert (levels.fate == Fate.UNKNOWN).any(axis=1).all()
     assert np.isnan(levels.violation).all()
-
-
-@pytest.mark.parametrize("rate", [1.0, 1e15])
-def test_frames_end_where_the_state_stops_being_finite_and_are_no_more_than_ticks(rate):
-    q = np.zeros((5, 7))
-    q[3:] = np.nan
-    assert scene(hand_made(q=q, order=np.zeros(5, int)), rate).ticks.tolist() == [0, 1, 2]
-
-
-def test_levels_that_were_not_judged_are_unknown_where_they_are_in_the_stack():
-    levels = levels_at(hand_made(orders=("a", "a > b"), order=[0, 1, 1, 0, 0]), [0, 1, 4])
-    assert levels.names == ("a", "b")
-    assert levels.fate.tolist() == [[Fate.UNKNOWN, Fate.ABSENT], [Fate.UNKNOWN, Fate.UNKNOWN],
-                                    [Fate.UNKNOWN, Fate.ABSENT]]
-    assert levels_at(hand_made(orders=("",)), [0, 4]).fate.shape == (2, 0)  # nothing was stacked

@@ -12,20 +12,11 @@ import pytest
 from hand_made import recording
 from refusals import refused
 
-from hierarchy import plugins
 from hierarchy.errors import HierarchyError, UnknownNameError
 from scenarios import load, load_run, save, simulate
-from scenarios.draw.figures.palette import looks
-from scenarios.draw.figures.panels import Panel
-from scenarios.export import grouped
 from scenarios.files import OutputError, claim, next_free, whole
 from scenarios.measure import run_folder
-from scenarios.measure.metrics import Metric
-from scenarios.measure.motions import motions
-from scenarios.measure.runs import Run, table
-from scenarios.recording.facts import _plain
-from scenarios.recording.signals import Signal, known
-from scenarios.results.sections import multiples
+from scenarios.recording.signals import known
 
 
 def test_a_run_in_the_home_folder_is_found_where_it_was_saved(tmp_path, monkeypatch):
@@ -45,19 +36,6 @@ def test_what_was_saved_is_loaded_again_to_the_last_bit(tmp_path):
     versions = json.loads((tmp_path / "run" / "versions.json").read_text())
     assert versions["numpy"] == np.__version__
     assert {"python", "pin", "task-hierarchy"} <= versions.keys()
-
-
-def test_a_recording_without_ticks_is_drawn_empty():
-    panels = recording(t=[]).plot().axes
-    assert [len(ax.lines) for ax in panels] == [7, 7, 3, 1]
-    assert not any(line.get_xdata().size for ax in panels for line in ax.lines)
-
-
-@pytest.mark.parametrize(("value", "kept"), [
-    (1.5, 1.5), (None, None), ((1, 2.0), (1, 2.0)), (np.inf, "inf"), ((1.0, np.inf), "(1.0, inf)"),
-    ([1.0], "[1.0]")])
-def test_a_setting_that_json_lacks_is_kept_as_text(value, kept):
-    assert _plain(value) == kept
 
 
 @pytest.mark.parametrize(("told", "said"), [("arm", "arm"), ("", "unknown processor")])
@@ -144,27 +122,3 @@ def test_a_signal_that_a_run_lacks_is_absent_and_a_misspelt_one_an_error_with_th
         refused("minimal_distance", ask, error=UnknownNameError)
     for name, values in run.signals.items():
         assert known(name).shape.strip("(,)").count(",") + 1 == values.ndim, name
-
-
-def test_a_signal_of_a_plugin_has_its_unit_and_topic_everywhere(run, no_plugins):
-    plugins.register("signals", "strain")(Signal("strain", "Pa", "(T,)", "of a link", "/links"))
-    assert "strain" not in run
-    run.signals["strain"] = np.zeros(run.ticks)
-    assert run.columns()["strain"][0] == "Pa"
-    assert set(grouped(run)["/links"]) == {"strain"}
-    del run.signals["strain"]
-
-
-def test_a_metric_and_a_figure_of_a_plugin_are_in_the_table_and_on_the_page(run, no_plugins):
-    @plugins.register("metrics", "strained")
-    def strained(recording, by):
-        yield Metric("strain_max", "Strain, max", float(recording.ticks), "Pa")
-
-    def draw(ax, recording, colour):
-        ax.plot(recording["t"], recording["q"][:, 0], color=colour)
-
-    plugins.register("figures", "first-joint")(Panel("first-joint", "First", "rad", "q", draw))
-    ours = Run(run.scenario, "own", "own", run)
-    assert ours.metrics["strain_max"].shown_unit == "Pa"
-    assert {row.name for row in table([ours])} >= {"strain_max", "speed_max"}
-    assert "own: First" in multiples("dual-arm", motions([ours]), looks([ours.label]))

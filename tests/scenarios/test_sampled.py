@@ -7,18 +7,15 @@ import subprocess
 import sys
 from unittest import mock
 
-import numpy as np
 import pytest
 from deadly import dies_of_one
 from refusals import refused
 
 from scenarios import load, shipped, simulate
-from scenarios.config.distributions import Distribution
 from scenarios.config.sampling import drawn
 from scenarios.measure import metrics
 from scenarios.results import plan as plan_of
-from scenarios.results import pool, sampled_page
-from scenarios.results.columns import Results, verdict
+from scenarios.results import pool
 from scenarios.results.plan import Job, Outcome, load_sweep, outcome, plan, shipped_sweeps
 from scenarios.results.sampled import Workers, compare_starts, complete, sweep
 from scenarios.results.store import FullError, Store
@@ -91,45 +88,6 @@ def test_every_shipped_sweep_can_be_planned_and_every_scenario_varies():
         assert first != second
 
 
-def test_samples_stay_as_they_are_when_others_are_added(tmp_path):
-    few = load_sweep(write(tmp_path))
-    more = load_sweep(write(tmp_path, PARAMETERS + "pointing.damping = { around = 0.5 }",
-                            samples="9", resolvers='["hcod", "tpm"]'))
-    other = few.model_copy(update={"seed": 8})
-    one, same, third = ([drawn(load("ellipse"), asked.parameters, asked.seed, index)
-                         for index in range(3)] for asked in (few, more, other))
-    assert all(a.items() <= b.items() for a, b in zip(one, same, strict=True))
-    assert len({tuple(sample["start.q"]) for sample in one + third}) == 6
-
-
-def test_samples_are_drawn_from_what_the_file_says(tmp_path):
-    asked, ellipse = load_sweep(write(tmp_path)), load("ellipse")
-    found = [drawn(ellipse, asked.parameters, asked.seed, index) for index in range(400)]
-    q = np.array([one["start.q"] for one in found]) - ellipse.start.q
-    assert np.abs(q).max() <= 0.05
-    assert q.std() == pytest.approx(0.05 / np.sqrt(3.0), rel=0.05)
-    damping = [one["position.damping"] for one in found]
-    assert (np.mean(damping), np.std(damping)) == pytest.approx((20.0, 1.0), abs=0.15)
-    assert {one["pointing.alpha_d"] for one in found} == {5.0, 15.0}
-    assert {one["plant.measurement.seed"] for one in found} == {3, 4, 5}
-    left_out = {"control.options.rank_tolerance": Distribution(uniform=(1e-9, 1e-9))}
-    assert drawn(ellipse, left_out, 0, 0) == {"control.options.rank_tolerance": 1e-9}
-
-
-def test_all_resolvers_see_the_same_samples_and_no_run_is_planned_twice(tmp_path):
-    planned = plan(load_sweep(write(tmp_path, resolvers='["tpm", "recursive", "tpm"]')))
-    texts = {}
-    for one in planned.runs:
-        texts.setdefault(one.sample, set()).add(one.text)
-    assert [len(seen) for seen in texts.values()] == [1, 1, 1]
-    assert len({one.key for one in planned.runs}) == len(planned.runs) == 6
-    planned = plan(load_sweep(write(tmp_path, "", scenarios='["ellipse-hqp", "ellipse"]')))
-    assert {one.scenario for one in planned.runs} == {"ellipse"}  # others cannot resolve it
-    assert (len(planned.runs), len(planned.refused)) == (2, 2)  # all samples are the same
-    page = sampled_page.sampled_page(planned, {}, tmp_path, "", "")
-    assert "2 runs: 1 sample, each under tpm and recursive" in page
-
-
 def test_runs_are_made_again_after_a_file_that_their_scenario_names_has_changed(tmp_path):
     motion, keys = tmp_path / "motion.csv", []
     path = f"position.path={{kind='recorded', file='{motion}'}}"
@@ -188,65 +146,6 @@ def test_what_has_ended_at_ctrl_c_is_given_up_unless_it_is_asked_for(monkeypatch
     next(ended)
     with pytest.raises(KeyboardInterrupt):
         ended.throw(KeyboardInterrupt)
-
-
-def test_the_distance_was_kept_by_runs_that_were_never_below_it():
-    jobs = tuple(Job(key, "", "tpm", label="tpm") for key in "abc")
-    below = {"body_below_share": np.array([0.0, 0.5, 1.0])}
-    assert Results(jobs, (None,) * 3, {}, below).shares()["Kept the distance asked for"] == {
-        "tpm": (1, 3)}
-    below["joint_limit_excess"] = np.full(3, np.nan)  # a robot without limits keeps to them
-    found = Results(jobs, (None, None, "broke"), {}, below).shares()
-    assert found["Kept the joint limits"]["tpm"] == (2, 3)
-
-
-@pytest.mark.parametrize(("outlier", "high"), [(12.0, 12.0), (13.0, 11.0), (30.0, 11.0)])
-def test_an_axis_shows_values_up_to_twice_the_width_of_their_middle_away(outlier, high):
-    values = np.append(np.linspace(10.0, 11.0, 100), outlier)
-    assert sampled_page._limits([values]) == pytest.approx((10.0, high))
-    assert sampled_page._limits([-values]) == pytest.approx((-high, -10.0))
-    for beyond, ends in ((0.0, (-2.0, 3.0)), (0.01, (0.0, 1.0))):
-        two = np.r_[-2.0 - beyond, np.zeros(20), np.ones(20), 3.0 + beyond]
-        assert sampled_page._limits([two]) == ends
-    for beyond, end in ((20.0, 20.0), (25.0, 8.04)):  # of values that are the same twice these
-        assert sampled_page._limits([np.r_[np.full(99, 8.0), beyond]])[1] == pytest.approx(end)
-    for same, room in ((-8.0, 0.04), (0.0, 0.005)):
-        assert sampled_page._limits([np.full(9, same)]) == pytest.approx((same - room, same + room))
-
-
-def test_the_farthest_of_the_values_beyond_an_axis_is_named_not_the_largest():
-    values = np.append(np.linspace(-100.0, -99.0, 100), 50.0)
-    metric = metrics.Metric("margin", "Margin", 1.0, "N")
-    jobs = tuple(Job("", "", "", sample=i, label="a") for i in range(101))
-    fig = sampled_page._spread(Results(jobs, (None,) * 101, {}, {"margin": values}), metric)
-    assert [text.get_text() for text in fig.axes[0].texts] == ["1 beyond, to 50"]
-
-
-@pytest.mark.parametrize(("speed", "stopped", "same", "best"), [
-    (1.0, 0, True, "none"), (1.0, 3, False, "none"), (np.nan, 16, False, "none"),
-    (0.1, 0, False, "Joint speed: b"), (0.1, 3, False, "none"), (0.1, 16, False, "none"),
-    (2.0, 3, False, "Joint speed: a")])
-def test_runs_that_stopped_early_are_neither_the_best_nor_the_same(speed, stopped, same, best):
-    values, reasons = np.linspace(1.0, 2.0, 16), (None,) * (32 - stopped) + ("fell",) * stopped
-    found = Results(tuple(Job("", "", "", sample=i, label=label) for label in "ab"
-                          for i in range(16)), reasons,
-                    {"speed_max": metrics.Metric("speed_max", "Joint speed", 1.0, "rad/s")},
-                    {"speed_max": np.r_[values, speed * values]})
-    said = verdict(found)
-    assert any(line.startswith("The same in every sample") for line in said) == same
-    assert said[-1] == f"Best beyond chance: {best}."
-    assert str(found.paired("speed_max", "b")).endswith(
-        f"; {stopped} without a pair" if stopped else "")
-
-
-def test_one_of_several_quantities_is_best_beyond_chance_only_if_it_would_be_alone():
-    names, one = ("speed_max", "acceleration_max"), np.linspace(1.0, 2.0, 6)  # p = 0.031
-    known = {name: metrics.Metric(name, name, 1.0, "") for name in names}
-    found = Results(tuple(Job("", "", "", sample=i, label=label) for label in "ab"
-                          for i in range(6)), (None,) * 12, known,
-                    dict.fromkeys(names, np.r_[one, 2.0 * one]))
-    assert found.best(known["speed_max"]) == ("a",)
-    assert verdict(found)[-1] == "Best beyond chance: none."
 
 
 def test_rows_that_were_cut_off_are_made_again_and_a_full_disk_is_said(tmp_path, monkeypatch):

@@ -1,29 +1,23 @@
 """A robot in MuJoCo with torque motors: its physics, and contacts before they are trusted."""
 
 from functools import partial
-from types import SimpleNamespace
 
 import numpy as np
 import pinocchio as pin
 import pytest
 from mechanisms import four_bar
 from refusals import refused
-from scipy.spatial.transform import Rotation
 from standing import IDEAL, ROBOT, accelerations, feet, moving_state
 from urdf_text import INERTIAL, LIMIT, joint, link, urdf
 
 from hierarchy import Robot, State
 from hierarchy.contacts import Contacts
-from hierarchy.tasks import TorqueLimits
-from scenarios import load, simulate
+from scenarios import load
 from scenarios.cell.build import build
-from scenarios.cell.plants.torque import TorqueRobot, inside
+from scenarios.cell.plants.torque import TorqueRobot
 from scenarios.config import ScenarioError
 from scenarios.config.sections.plant import PushSection, TorqueSection
 from scenarios.loop.controller import Controller
-from scenarios.loop.footing import footing
-from scenarios.measure.metrics import measure
-from scenarios.measure.safety import standing
 
 pytestmark = pytest.mark.usefixtures("with_mujoco")
 
@@ -78,17 +72,6 @@ def one_joint(folder, inertial=INERTIAL, limit=LIMIT, kind="revolute"):
         "only", kind, "base", "arm", limit)))
 
 
-@pytest.mark.parametrize("period", [0.0005, 0.001, 0.0025, 0.004])
-def test_a_period_is_simulated_in_steps_of_a_millisecond_at_most(period, tmp_path):
-    plant = alone(one_joint(tmp_path), np.zeros(1), period=period, bandwidth=60.0)
-    before = plant.data.ctrl.copy()
-    plant.act(np.full(1, 2.0))
-    assert plant.data.time == pytest.approx(period)
-    assert 0.0005 <= plant.model.opt.timestep <= 0.001
-    share = 1.0 - np.exp(-2.0 * np.pi * 60.0 * period)
-    np.testing.assert_allclose(plant.data.ctrl, before + share * (2.0 - before))
-
-
 def test_an_inertia_that_no_body_has_becomes_its_mean(tmp_path):
     robot = one_joint(tmp_path, INERTIAL.replace("0.4", "1.4"))
     moments = np.linalg.eigvalsh(robot.model.inertias[1].inertia)
@@ -117,19 +100,6 @@ def test_a_joint_of_several_axes_is_named():
     refused("joint 'rocker' does not turn", alone, bar, error=ScenarioError)
 
 
-def test_torques_arrive_late_by_the_delay_and_are_cut_off_at_their_limits():
-    q, v, _ = in_the_air(8)
-    plant = TorqueRobot(ROBOT, CONTACTS, q, v, section=plant_with(delay=0.002))
-    holding, sent = State.at(ROBOT, q).bias_effort()[6:], []
-    for _ in range(4):
-        plant.act(np.full(30, 1e4))
-        sent.append(plant.data.actuator_force.copy())
-    np.testing.assert_allclose(sent[0], np.clip(holding, -ROBOT.effort_limit[6:],
-                                                ROBOT.effort_limit[6:]))
-    np.testing.assert_array_equal(sent[0], sent[1])
-    np.testing.assert_allclose(sent[2], ROBOT.effort_limit[6:])
-
-
 def test_a_push_gives_the_whole_robot_its_momentum():
     q, _, _ = in_the_air(9)
     push = PushSection(joint="trunk_pitch", force=100.0, direction=90.0, at=0.005, duration=0.01)
@@ -145,21 +115,6 @@ def test_a_push_gives_the_whole_robot_its_momentum():
     np.testing.assert_allclose(np.sum(seen, axis=0), [0.0, 1000.0, 0.0], atol=1e-9)
 
 
-def two_arms(**keys):
-    robot = Robot.named("dual_arm")
-    robot.lower[2] = -np.inf  # and a stop above
-    return robot, alone(robot, robot.configuration(np.zeros(robot.n)), beyond_stop=1e3, fall=1e3,
-                        tilt=3.0, **keys)
-
-
-def test_a_joint_stops_at_its_limit_unless_it_has_no_stop():
-    robot, with_stops = two_arms()
-    _, without = two_arms(stops=False)
-    torque, limit = 20.0 * np.eye(robot.n)[2], robot.upper[2]
-    assert driven(with_stops, torque, 2.0).q[2] < limit + 0.1
-    assert driven(without, torque, 2.0).q[2] > limit + 0.5
-
-
 def test_a_continuous_joint_has_no_stop_and_an_arm_that_sinks_does_not_fall(tmp_path):
     """The limits of its cosine, 1.01, were those of its angle."""
     robot = one_joint(tmp_path, limit="", kind="continuous")
@@ -168,135 +123,6 @@ def test_a_continuous_joint_has_no_stop_and_an_arm_that_sinks_does_not_fall(tmp_
         plant.act(State.at(robot, plant.q).bias_effort())
     assert robot.vector(plant.q) > 2.9
     assert plant.fault is None
-
-
-def test_torques_follow_with_the_bandwidth_of_the_motors():
-    robot, slow = two_arms(bandwidth=5.0)
-    first = slow.data.ctrl[0]
-    driven(slow, 10.0 * np.eye(robot.n)[0], 1.0 / (2.0 * np.pi * 5.0))
-    assert slow.data.ctrl[0] - first == pytest.approx((10.0 - first) * (1.0 - np.exp(-1.0)),
-                                                      rel=0.05)
-
-
-def recorded(fault=None, pushes=(), **changes):
-    """A run of 5 s in which a robot stands still, but for what is changed."""
-    t = np.arange(0.0, 5.0, 0.01)
-    run = type("Run", (dict,), {
-        "ticks": t.size, "fault": fault, "true": dict.get, "scenario": SimpleNamespace(
-            control=SimpleNamespace(duration=5.0), plant=SimpleNamespace(pushes=pushes))})
-    return run({"t": t, "v": np.zeros((t.size, 2)), "q": np.zeros((t.size, 2)),
-                "com": np.tile([0.0, 0.0, 0.8], (t.size, 1)),
-                "support_margin": np.full(t.size, 0.1), "joint_lower": np.full(2, -1.0),
-                "joint_upper": np.full(2, 1.0), **changes})
-
-
-def from_tick(tick, value, shape=(500, 2)):
-    values = np.zeros(shape)
-    values[tick:] = value
-    return values
-
-
-@pytest.mark.parametrize(("changes", "stands"), [
-    ({}, True), ({"v": from_tick(100, 0.3) - from_tick(101, 0.3)}, True),
-    ({"v": from_tick(400, 0.3) - from_tick(401, 0.3)}, False),
-    *(({"q": from_tick(0, sign * far)}, far < 1.01) for sign in (-1, 1) for far in (1.005, 1.1)),
-    ({"support_margin": from_tick(0, np.nan, 500)}, False),
-    ({"com": from_tick(0, [0.0, 0.0, 0.8], (500, 3)) - from_tick(1, [0, 0, 0.1], (500, 3))},
-     False), ({"fault": "the robot has fallen"}, False),
-    ({"pushes": (SimpleNamespace(at=2.75, duration=0.25),)}, True),
-    ({"pushes": (SimpleNamespace(at=2.9, duration=0.2),)}, None)])
-def test_a_robot_stands_only_at_rest_upright_and_within_its_limits_until_the_end(changes, stands):
-    assert standing(recorded(**changes)) is stands
-
-
-@pytest.mark.parametrize(("name", "keys"), [
-    ("wipe", {"plant.pushes": [{"joint": "joint_4", "force": 1e200, "direction": 0.0, "at": 2.003,
-                                "duration": 0.1}], "control.duration": 2.1}),
-    ("stand-push", {"plant.pushes": [{"joint": "trunk_pitch", "force": 1e200, "direction": 0.0,
-                                      "at": 0.012, "duration": 0.1}],
-                    "control.duration": 0.05, "control.period": 0.004})])
-def test_a_run_whose_simulation_breaks_is_measured_up_to_there(name, keys):
-    run = simulate(load(name, keys))
-    assert run.fault.startswith("the state is not finite")
-    assert np.isnan(run["floor_force"][-1]).any()
-    assert measure(run)["stack_changes"].value == 0.0
-
-
-def test_a_base_that_tilts_has_fallen():
-    q, v = ROBOT.rest.copy(), np.zeros(ROBOT.n)
-    q[2] += 100.0
-    v[3:6] = [1.0, -2.0, 0.5]
-    plant = TorqueRobot(ROBOT, feet(), q, v,
-                        section=plant_with(tilt=0.5, fall=1e3, beyond_stop=1e3))
-    for _ in range(1000):
-        angle = Rotation.from_quat(plant.q[3:7]).apply([0.0, 0.0, 1.0])[2]
-        assert (plant.fault is not None) == (np.arccos(angle) > 0.5)
-        if plant.fault:
-            break
-        plant.act(np.zeros(ROBOT.n - 6))
-    assert plant.fault.startswith("the robot has fallen: its base has tilted by 0.5 rad (")
-
-
-def test_a_share_of_the_torques_limits_them_and_what_stays_the_same_is_kept():
-    scenario = load("reach-torque", ["limits.torque=0.5"])
-    cell = build(scenario)
-    half = 0.5 * cell.robot.effort_limit[6:]
-    np.testing.assert_array_equal(cell.torque_limit, half)
-    limits = TorqueLimits(cell.robot, 0.5, contacts=cell.contacts)
-    np.testing.assert_array_equal(limits.bounds(cell.state), [-half, half])
-    assert scenario.model_copy(update={"limits": None}).asks == "inequalities"
-    seen = build(load("ellipse"))
-    assert build(load("ellipse", ["position.gain=2.0"]), seen).sensor is seen.sensor
-
-
-@pytest.mark.parametrize(("place", "found"), [
-    ((0.5, 0.5), 0.5), ((0.9, 0.4), 0.1), ((1.2, 0.5), -0.2), ((0.0, 0.3), 0.0)])
-def test_the_margin_of_support_is_that_from_the_nearest_edge(place, found):
-    corners = np.array([(0.0, 0.0), (1.0, 1.0), (1.0, 0.0), (0.0, 1.0), (0.5, 0.2), (0.0, 0.0)])
-    assert inside(corners, np.array(place)) == pytest.approx(found)
-    assert np.isnan(inside(corners[:2], np.array(place)))
-
-
-def doubts(scenario, change):
-    """What a first tick says of a robot with contacts whose run may fall, or prove nothing."""
-    cell = build(scenario)
-    change(cell.robot)
-    controller = Controller(cell)
-    controller.command(0.0, cell.plant.q, cell.plant.v)
-    return list(footing(controller))
-
-
-def of_strong_drives(robot):
-    robot.effort_limit[robot.actuated:] *= 1000.0
-
-
-def of_a_thin_shank(robot):
-    knee = robot.joint("left_knee")
-    robot.model.inertias[knee] = pin.Inertia(3.0, np.zeros(3), np.diag([0.03, 0.01, 0.01]))
-
-
-def of_a_motor_without_limit(robot):
-    robot.effort_limit[robot.velocity_names.index("left_knee")] = np.inf
-
-
-LEFT = {"frame": "left_foot", "x": [-0.05, 0.16], "y": [-0.04, 0.04]}
-CASES = {
-    "no effort limit": (of_a_motor_without_limit, "does not limit left_knee"),
-    "effort limits that say nothing": (of_strong_drives, "it holds the robot, whatever"),
-    "an inertia that no body has": (of_a_thin_shank, "no body has the inertia that moves with "
-                                    "left_knee")}
-
-
-@pytest.mark.parametrize("case", CASES)
-def test_what_a_robot_lacks_that_may_make_a_run_fall_or_prove_nothing_is_said(case):
-    change, words = CASES[case]
-    assert words in " ".join(doubts(load("stand-push"), change))
-
-
-def test_without_gravity_nothing_has_to_stand():
-    scenario = load("stand-push").with_changes({"contacts": [LEFT]})
-    assert "stand" not in " ".join(doubts(
-        scenario, lambda robot: setattr(robot.model.gravity, "linear", np.zeros(3))))
 
 
 def test_a_robot_that_is_put_on_the_floor_is_carried_from_the_first_tick_on():

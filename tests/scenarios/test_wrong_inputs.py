@@ -13,16 +13,8 @@ from hierarchy.tasks import JointLimits, Position, SelfSeparation
 from scenarios import compare, load, save, simulate
 from scenarios.cli.terminal import lines
 from scenarios.config import ScenarioError
-from scenarios.loop.first_tick import first_tick
 from scenarios.toml_text import read_toml
-from solvers import Resolution, Resolver, Status, certify, explain, make, solve_ik
-
-
-def test_rounding_of_a_robot_at_rest_at_its_targets_is_not_said_to_be_missed():
-    """A posture was missed by 1.42e-14, held back by grip and tray."""
-    hand, grip = {"frame": "right_hand"}, {"frame": "left_hand", "to": "right_hand"}
-    tasks = [{"kind": "relative", **grip}, {"kind": "pose", **hand}, {"kind": "posture"}]
-    assert first_tick(load("dual-arm", {"tasks": tasks, "control.resolver": "hcod"})).unmet == ()
+from solvers import certify, explain, make, solve_ik
 
 
 def test_obstacles_are_reached_by_number_or_all_at_once():
@@ -132,25 +124,6 @@ def test_a_file_with_a_byte_order_mark_and_names_in_any_alphabet_is_read(tmp_pat
     file = tmp_path / "größe.toml"
     file.write_bytes('extends = "ellipse"\nname = "Größe-模型"\n'.encode("utf-8-sig"))
     assert load(file).name == "Größe-模型"
-
-
-def mine(returned):
-    """A resolver of a plugin that returns what a function makes of a hierarchy."""
-    return type("Mine", (Resolver,), {
-        "name": "mine", "solve": lambda self, h, memory=None: returned(h)})()
-
-
-@pytest.mark.parametrize(("returned", "error", "said"), [
-    (lambda h: np.zeros(h.n), HierarchyError, "solve: expected a Resolution, got ndarray"),
-    (lambda h: Resolution(1.0), HierarchyError, "x: expected an array of 7 floats, got float 1.0"),
-    (lambda h: Resolution(np.zeros(3)), HierarchyError, "expected an array of 7 floats"),
-    (lambda h: h.nonsense, AttributeError, "nonsense")])
-def test_what_a_resolver_of_a_plugin_returns_is_judged_and_its_errors_are_shown(
-        returned, error, said):
-    h = Hierarchy.from_levels([(np.eye(7)[:3], np.ones(3))])
-    refused(said, lambda: mine(returned).solve(h), error=error)
-    found = mine(lambda h: Resolution(np.full(h.n, np.nan))).solve(h)
-    assert (found.status, found.x.any()) == (Status.NUMERICAL_FAILURE, False)
 
 
 def test_a_long_command_says_every_ten_seconds_how_far_it_is_and_what_is_left(capsys):
