@@ -8,11 +8,11 @@ import pytest
 from scene import BODY, OBSTACLES, ROBOT, SENSOR, TIP, TURN, distance, place_of, state_at, states
 from standing import written
 
-from hierarchy import Stack, State
+from hierarchy import State
 from hierarchy.allocation import allocate
 from hierarchy.avoidance import Obstacle, Obstacles, Repulsion, SurveillanceAreas
 from hierarchy.paths import Waypoints
-from hierarchy.tasks import CumulatedRepulsion, DangerBounds, JointDamping, JointLimits, Posture
+from hierarchy.tasks import CumulatedRepulsion, DangerBounds, JointLimits
 
 SHAPES = {shape: Obstacle(shape, (0.1, -0.2, 0.3), *size) for shape, *size in (
     ["point"], ["sphere", (0.15,)], ["capsule", (0.1, 0.25), TURN], ["box", (0.2, 0.1, 0.3), TURN])}
@@ -112,14 +112,6 @@ def test_every_branch_and_tie_of_algorithm_1(body, end, cone, order, repulsion):
     assert allocate(body, end, cone, AREAS) == (order, repulsion)
 
 
-def test_an_equality_pointing_task_is_always_there_and_one_area_leaves_no_outer_one():
-    for body, cone, order in ((0.2, -1.0, (P, C)), (0.1, -1.0, (P, C, A)), (0.2, nan, (P,))):
-        assert allocate(body, 0.2, cone, AREAS, always_point=True).order == order
-    areas = SurveillanceAreas(near=0.4, far=0.4, end_effector=0.4)
-    assert allocate(0.4, 1.0, -1.0, areas).order == (A, P)
-    assert allocate(0.41, 1.0, -1.0, areas).order == (P,)
-
-
 PERIOD, REACH, SHAPE = 1e-3, 0.5, 6.0
 LIMITS = JointLimits(ROBOT, 30.0, PERIOD)
 QUICK = JointLimits(ROBOT, 1e6, PERIOD)  # its accelerations limit nothing
@@ -202,17 +194,3 @@ def test_it_is_the_sum_of_what_each_near_point_asks_for(lever):
         np.testing.assert_allclose(task.reference_velocity(state), by_hand(state, False, lever),
                                    rtol=1e-6, atol=1e-8)
     assert 8 < counted < 32, "some points are near, and some are not"
-
-
-@levels
-@pytest.mark.parametrize("base", [None, JointDamping(7, 3.0), Posture((0.1,) * 7)])
-def test_a_stack_has_it_as_its_null_space_term_added_to_the_base(level, base):
-    task = CumulatedRepulsion(7, ROBOT.control_points, WITHIN, base)
-    stack = Stack([Posture((0.0,) * 7, name="any")], level, task)
-    for q, v in states(3):
-        state = state_at(q, v)
-        for _ in range(2):  # nothing of the tick before is left
-            found = stack.hierarchy(state).reference.copy()
-        expected = CumulatedRepulsion(7, ROBOT.control_points, WITHIN)
-        sides = [getattr(one, f"reference_{level}")(state) for one in (expected, base) if one]
-        np.testing.assert_allclose(found, sum(sides), atol=1e-12)

@@ -121,14 +121,6 @@ def test_the_edges_of_a_sole_are_those_of_its_hull():
         (0, 0, 0, 1), (2, 0, -1, 0), (2, 2, 0, -1), (0, 2, 1, 0)}
 
 
-@pytest.mark.parametrize(("t", "ramp", "load"), [
-    (0.0, 0.2, 1.0), (0.8, 0.2, 1.0), (0.9, 0.2, 0.5), (1.0, 0.2, 0.0), (1.5, 0.2, 0.0),
-    (2.0, 0.2, 0.0), (2.05, 0.2, 0.25), (2.5, 0.2, 1.0), (0.99, 0.0, 1.0), (1.5, 0.0, 0.0)])
-def test_the_load_of_a_contact_ramps_around_the_time_in_which_it_is_open(t, ramp, load):
-    left, right = opening(ramp).contacts
-    assert (right.load(t), left.load(t), left.ramp) == (pytest.approx(load), 1.0, 0.1)
-
-
 @pytest.mark.parametrize("faces", [4, 8])
 def test_an_open_contact_has_no_force_and_is_free_to_move(faces):
     contacts, state = opening(), State.at(ROBOT, ROBOT.rest, t=1.5)

@@ -11,9 +11,9 @@ from urdf_text import LIMIT, joint, link, placed, urdf
 from hierarchy import Robot, Stack, State
 from hierarchy.errors import RobotError, UnknownNameError
 from hierarchy.robots import TABLES
-from hierarchy.robots.found import Coupled, Loop
+from hierarchy.robots.found import Loop
 from hierarchy.robots.from_table import from_table
-from hierarchy.robots.table import DHTable, Link, TreeFrame, TreeJoint, TreeTable
+from hierarchy.robots.table import Link, TreeFrame, TreeJoint, TreeTable
 from hierarchy.tasks import JointCoupling, JointLimits, Mechanism, Posture, Together, model_rows
 from solvers import make, solve_ik
 
@@ -221,40 +221,6 @@ def test_joint_limits_cover_a_floating_base_where_it_has_limits():
     refused("has a fixed base", JointLimits, ROBOT, 5.0, T, base_acceleration=(1.0, 1.0))
 
 
-def test_kinematics_equal_the_table_multiplied_out():
-    """The letter's Denavit-Hartenberg matrices."""
-    robot = Robot.named("kuka_lwr")
-    frame, alphas = robot.frame("end_effector"), np.deg2rad([90, -90, -90, 90, 90, -90, 0])
-    for q in np.random.default_rng(0).uniform(-3, 3, (50, 7)):
-        state, T = State.at(robot, q), np.eye(4)
-        for angle, d, alpha in zip(q, [0, 0, 0.4, 0, 0.39, 0, 0.078], alphas, strict=True):
-            c, s, ca, sa = np.cos(angle), np.sin(angle), np.cos(alpha), np.sin(alpha)
-            T = T @ [[c, -s * ca, s * sa, 0], [s, c * ca, -c * sa, 0], [0, sa, ca, d], [0, 0, 0, 1]]
-        np.testing.assert_allclose(state.position(frame), T[:3, 3], atol=1e-14)
-        np.testing.assert_allclose(state.rotation(frame), T[:3, :3], atol=1e-14)
-
-
-@pytest.mark.parametrize(("robot", "what", "entry", "name"), [
-    ("kuka_lwr", "q", 2, "joint_3"), ("kuka_lwr", "v", 1, "joint_2"),
-    ("humanoid", "q", 0, "root_joint 1"), ("humanoid", "q", 6, "root_joint 7"),
-    ("humanoid", "q", 7, "left_hip_yaw"), ("humanoid", "q", 36, "neck_pitch"),
-    ("humanoid", "v", 5, "root_joint 6"), ("humanoid", "v", 10, "left_ankle_pitch")])
-def test_an_entry_that_is_not_finite_is_named_by_its_own_joint(robot, what, entry, name):
-    robot = Robot.named(robot)
-    given = {"q": robot.rest.copy(), "v": np.zeros(robot.n)}
-    for value in (np.nan, np.inf):
-        given[what][entry] = value
-        refused(f"{what}[{entry}] ({name}) is {value}", State.at, robot, **given, error=RobotError)
-
-
-@pytest.mark.parametrize(("a", "d"), [(1.0, 0.0), (-0.6, 0.8), (0.0, 1.0)])
-def test_a_link_of_a_table_is_a_rod_wherever_it_leads(a, d):
-    table = DHTable("rod", (a,), (d,), (0.0,), (90.0,), (1.0,), (1.0,), (3.0,), 1e-4, ())
-    found = from_table(table)
-    M = State(Robot(found.model, "rod", found=found)).mass_matrix()
-    np.testing.assert_allclose(M, [[3.0 * a**2 / 3.0]], atol=1e-7)
-
-
 @pytest.mark.parametrize("part", [
     {"links": (("x", Link(mass=1.0)),)}, {"control_points": (("x", (0, 0, 0)),)},
     {"frames": (TreeFrame("f", "x", (0, 0, 0)),)}])
@@ -312,12 +278,6 @@ def test_rows_of_a_mechanism_are_derivatives_of_its_error(rigid):
                                atol=1e-8)
     dJ = (task.jacobian(at(h * v)) - task.jacobian(at(-h * v))) / (2 * h)
     np.testing.assert_allclose(task.jacobian_derivative(at(0 * v)), dJ, atol=1e-8)
-
-
-@pytest.mark.parametrize(("coefficients", "said"), [
-    ((1.0, -2.0, 0.0, 0.0, 0.0, 3.0), "3 b^5 - 2 b + 1"), ((0.5,), "0.5"), ((0.0, 0.0), "0")])
-def test_a_coupling_is_written_whatever_its_degree(coefficients, said):
-    assert str(Coupled("a", "b", coefficients)) == f"a = {said} in the file"
 
 
 def planar_bar(rigid, rounding):

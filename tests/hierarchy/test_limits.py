@@ -274,21 +274,6 @@ def test_the_clamp_answers_anything_with_a_command_of_the_box(level):
 
 
 # ---- the tasks --------------------------------------------------------------------------------
-@LEVELS
-def test_the_rows_are_the_identity_and_the_box(level):
-    task = JointLimits(ROBOT, 10.0, 1e-3, margin=0.02)
-    limits = Limits(ROBOT.lower + 0.02, ROBOT.upper - 0.02, ROBOT.velocity_limit,
-                    np.full(7, 10.0), 1e-3)
-    for q, v in states(10):
-        state = state_at(q, v)
-        A, *sides = written(task, state, level, 7)
-        np.testing.assert_array_equal(A, np.eye(7))
-        for box in (task.box(state, level), limits.box(q, v, level)):
-            np.testing.assert_array_equal(sides, box)
-        x = np.linspace(-50, 50, 7)
-        np.testing.assert_array_equal(task.clamp(state, level, x), np.clip(x, *box))
-
-
 def test_the_error_is_how_far_a_joint_is_from_its_range():
     task, q = JointLimits(ROBOT, 10.0, 1e-3, margin=0.1), np.zeros(7)
     q[0], q[3] = ROBOT.upper[0], ROBOT.lower[3] - 0.2

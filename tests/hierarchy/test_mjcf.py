@@ -246,40 +246,37 @@ def residual(path, q):
     return data.efc_pos[data.efc_type == int(mujoco.mjtConstraint.mjCNSTR_EQUALITY)]
 
 
-def test_couplings_are_polynomials_of_positions(written):
-    path = written(world(
-        link("a", 'ref="20"', link("b", 'ref="-30"', link("c"))),
-        '<equality><joint joint1="a_joint" joint2="b_joint" polycoef=".1 .2 .3 .4 .5"/>'
-        '<joint joint1="c_joint" polycoef=".2 0 0 0 0"/></equality>'))
-    one, other = Robot.load(path).coupled
-    assert (one.joint, one.other, other.joint, other.other) == ("a_joint", "b_joint", "c_joint", "")
-    for b in (-1.0, 0.3, 0.9):
-        q = [np.polyval(one.coefficients[::-1], b), b, other.coefficients[0]]
-        np.testing.assert_allclose(residual(path, q), 0.0, atol=1e-12)
-    held = Robot.load(path, locked={"b_joint": 0.3}).coupled[0]
-    np.testing.assert_allclose(held.coefficients, [np.polyval(one.coefficients[::-1], 0.3)])
-    off = path.read_text().replace("<equality>", '<option><flag equality="disable"/></option>'
-                                   "<equality>")
-    robot = Robot.load(written(off[len("<mujoco>"):-len("</mujoco>")]))
-    assert not robot.coupled
-    assert any(said.startswith("equalities that are not active") for said in robot.missing)
+TIED = ('<fixed name="{0}"><joint joint="{1}" coef=".5"/><joint joint="{2}" coef="-2"/></fixed>'
+        '<fixed name="{2}"><joint joint="{2}" coef="3"/></fixed>')
+TENDONS = (f'<tendon>{TIED.format("ab", "a_joint", "b_joint")}'
+           f'{TIED.format("cd", "c_joint", "d_joint")}</tendon>')
 
 
-def test_tendons_that_keep_their_length_couple_their_joints(written):
-    tie = ('<fixed name="{0}"><joint joint="{1}" coef=".5"/><joint joint="{2}" coef="-2"/></fixed>'
-           '<fixed name="{2}"><joint joint="{2}" coef="3"/></fixed>')
-    path = written(world(
-        link("a", 'ref="20"', link("b", 'ref="-30"', link("c", more=link("d")))),
-        f'<tendon>{tie.format("ab", "a_joint", "b_joint")}{tie.format("cd", "c_joint", "d_joint")}'
-        '</tendon><equality><tendon tendon1="ab" polycoef=".1 0 0 0 0"/>'
-        '<tendon tendon1="d_joint" polycoef=".3 0 0 0 0"/></equality>'))
+@pytest.mark.parametrize(("tendons", "equalities"), [
+    ("", '<joint joint1="b_joint" joint2="a_joint" polycoef=".1 .2 .3 .4 .5"/>'
+     '<joint joint1="d_joint" polycoef=".2 0 0 0 0"/>'),
+    (TENDONS, '<tendon tendon1="ab" polycoef=".1 0 0 0 0"/>'
+     '<tendon tendon1="d_joint" polycoef=".3 0 0 0 0"/>')])
+def test_joints_follow_others_by_polynomials_of_positions_or_by_tendons(
+        tendons, equalities, written):
+    sections = f"{tendons}<equality>{equalities}</equality>"
+    arm = link("a", 'ref="20"', link("b", 'ref="-30"', link("c", more=link("d"))))
+    path = written(world(arm, sections))
     one, other = Robot.load(path).coupled
     assert (one.joint, one.other, other.joint, other.other) == ("b_joint", "a_joint", "d_joint", "")
-    for a in (-1.0, 0.4):
+    for a in (-1.0, 0.3, 0.9):
         q = [a, np.polyval(one.coefficients[::-1], a), 0.2, other.coefficients[0]]
         np.testing.assert_allclose(residual(path, q), 0.0, atol=1e-12)
-    (held, _) = Robot.load(path, locked={"b_joint": q[1]}).coupled
-    assert (held.joint, held.coefficients) == ("a_joint", (pytest.approx(0.4),))
+    if tendons:
+        (held, _) = Robot.load(path, locked={"b_joint": q[1]}).coupled
+        assert (held.joint, held.coefficients) == ("a_joint", (pytest.approx(0.9),))
+    else:
+        held = Robot.load(path, locked={"a_joint": 0.3}).coupled[0]
+        np.testing.assert_allclose(held.coefficients, [np.polyval(one.coefficients[::-1], 0.3)])
+    robot = Robot.load(written(world(
+        arm, f'<option><flag equality="disable"/></option>{sections}')))
+    assert not robot.coupled
+    assert any(said.startswith("equalities that are not active") for said in robot.missing)
 
 
 @pytest.mark.parametrize(("equality", "rigid"), [

@@ -15,8 +15,6 @@ from hierarchy import Robot
 from hierarchy.avoidance.body import pairs_of_tree
 from hierarchy.errors import RobotError, UnknownNameError
 from hierarchy.robots import files, names
-from hierarchy.robots.from_table import _capsule_inertia
-from hierarchy.robots.table import Link
 from hierarchy.tasks.separation import separable_pairs
 from scenarios.cell.robot import make_robot
 from scenarios.config.sections.robot import RobotSection
@@ -120,18 +118,6 @@ def test_a_robot_of_robot_descriptions_is_read_from_where_it_was_downloaded(arm,
             error=RobotError)
 
 
-@pytest.mark.usefixtures("example_robot_data")
-@pytest.mark.parametrize(("name", "joints", "end"), [("panda", 9, "panda_hand_tcp"),
-                                                     ("xarm7", 7, "link_eef")])
-def test_arms_of_example_robot_data_are_read_with_their_meshes(name, joints, end):
-    robot = Robot.load(f"example_robot_data:{name}")
-    assert (robot.n, robot.end_effector) == (joints, end)
-    assert not [said for said in robot.missing if "meshes" in said]
-    assert len(robot.capsules) >= 8
-    assert len(robot.control_points) == 8
-    assert np.isfinite([robot.lower, robot.upper]).all()
-
-
 # What is wrong in a file is named before pinocchio reads it, which would end the process or say
 # "not a valid URDF model". First changes of a file that is right.
 PLAIN = {"link": "", "kind": "revolute", "parent": "base", "axis": "0 0 1", "mimic": "", "more": "",
@@ -222,18 +208,6 @@ def test_a_name_is_looked_for_in_the_installed_packages(monkeypatch):
     assert names.elsewhere("stretchy") == (
         "The installed packages have one:stretch, third:stretcher.")
     assert "descriptions" in names.elsewhere("ur5")
-
-
-@pytest.mark.parametrize("end", [
-    (0.4, 0.0, 0.0), (0.0, -0.3, 0.0), (0.3, 0.0, 0.4), (0.0, 0.0, 2.0), (0.0, 0.0, 0.0)])
-def test_the_inertia_of_a_link_of_a_table_is_that_of_a_cylinder_along_it(end):
-    found, length = _capsule_inertia(Link(end, 0.05, 3.0)), np.linalg.norm(end)
-    axis = np.array(end) / length if length else np.eye(3)[2]
-    along, across = 3.0 * 0.05**2 / 2, 3.0 * (3 * 0.05**2 + (length + 0.1)**2) / 12
-    expected = across * np.eye(3) + (along - across) * np.outer(axis, axis)
-    np.testing.assert_allclose(found.inertia, expected, atol=1e-15)
-    np.testing.assert_allclose(found.lever, np.array(end) / 2)
-    assert (found.mass, _capsule_inertia(Link(end, 0.05)).mass) == (3.0, 0.0)
 
 
 def test_a_robot_whose_shapes_cannot_be_read_has_none_and_says_so(arm, monkeypatch):

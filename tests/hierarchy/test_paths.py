@@ -30,14 +30,6 @@ def test_what_is_written_into_the_array_of_a_still_point_moves_it():
     np.testing.assert_array_equal(out, [goal, np.zeros(3), np.zeros(3)])
 
 
-def test_a_circle_about_an_oblique_axis_has_its_radius():
-    from_centre = [CIRCLE(t)[0] - (0.1, 0.2, 0.3) for t in TIMES]
-    np.testing.assert_allclose(np.linalg.norm(from_centre, axis=1), 0.2)
-    np.testing.assert_allclose(from_centre @ np.array([0.2, -0.4, 1.0]), 0.0, atol=1e-15)
-    about_x = paths.circle((0.1, 0.2, 0.3), 0.2, (1.0, 0.0, 0.0))
-    np.testing.assert_allclose(about_x(0.0)[0], (0.1, 0.4, 0.3))  # from y
-
-
 def test_blended_waypoints_do_not_stop_and_miss_corners_by_what_is_said():
     path = BLENDED
     for i in (1, 2):

@@ -4,12 +4,11 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from refusals import refused
 from scene import BODY, ROBOT, TIP, TURN, compiled_rows, states
 from scipy.optimize import lsq_linear
 
 from hierarchy import Robot, State
-from hierarchy.avoidance import Barrier, Capsule, Measurement, Obstacle, Obstacles, Pairs
+from hierarchy.avoidance import Barrier, Capsule, Obstacle, Obstacles
 from hierarchy.avoidance.body import measure_capsules, pack_capsules
 from hierarchy.paths import Ellipse
 from hierarchy.tasks import SelfSeparation, Separation
@@ -49,20 +48,6 @@ def test_rows_give_the_second_derivative_of_the_distances_to_moving_obstacles():
     assert checked >= 54 * len(STATES) - 2
     parts = seen.distance, seen.direction, seen.velocity, seen.acceleration, seen.straight
     np.testing.assert_array_equal(seen.table, np.dstack([*parts, seen.radius]))
-
-
-@pytest.mark.parametrize(("pairs", "obstacles", "said"), [
-    (None, 1, "'separation': the state carries no measurement of pairs"),
-    (Pairs(9, 2), 1, "9 points are measured against 2 obstacles, expected 9 against 1"),
-    (Pairs(8, 1), 1, "8 points are measured against 1 obstacles, expected 9"),
-    (Pairs(9, 0), None, "against 0 obstacles, expected 9 against one at least")])
-def test_a_measurement_that_does_not_fit_is_named(pairs, obstacles, said):
-    state = State.at(ROBOT, np.array([0.923, -0.854, 0.903, 1.195, 0.971, 1.796, 0.0]))
-    task = Separation(SENSOR.points, Barrier(0.05, influence=5.0), obstacles)
-    refused("measurement of pairs", task.rows, state)
-    state.measurement = Measurement(8)
-    state.measurement.pairs = pairs
-    refused(said, task.rows, state)
 
 
 # Capsules at odds with the links' own axes, so that every kind of nearest points comes up.

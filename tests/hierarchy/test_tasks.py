@@ -12,7 +12,7 @@ from scene import FRAME, PATH, ROBOT, TASKS, compiled_rows, of_user, place_of, s
 from scipy.linalg import expm
 from urdf_text import LIMIT, joint, link, loaded, placed
 
-from hierarchy import Robot, Stack, State, tasks
+from hierarchy import Stack, State, tasks
 from hierarchy.activation import Activation
 from hierarchy.avoidance import Barrier, Measurement, Pairs
 from hierarchy.kinematics import cross, rotation_vector
@@ -77,16 +77,6 @@ def test_jacobian_derivative_agrees_with_central_differences(name):
         # Second derivatives are large near a singularity and behind: the differences round.
         rtol, atol = (1e-5, 1e-8) if name.startswith(("manip", "look")) else (1e-7, 3e-9)
         np.testing.assert_allclose(task.jacobian_derivative(state), difference, rtol, atol)
-
-
-@pytest.mark.parametrize("name", ["posture", "coupling", "frame", "momentum"])
-def test_exact_derivatives_take_no_difference_of_ticks(name):
-    (q, v), (_, other) = STATES[:2]
-    states = [state_at(q, v, differences=differences) for differences in (None, 1e-3)]
-    for state in states:
-        state.move(0.7, q + 0.01 * other, other)
-    exact, ticked = (TASKS[name].jacobian_derivative(state) for state in states)
-    np.testing.assert_array_equal(ticked, exact)
 
 
 @pytest.mark.parametrize("level", ["velocity", "acceleration"])
@@ -314,29 +304,6 @@ def test_a_copy_of_a_stack_that_was_used_is_a_stack_of_its_own(copied):
     other.remove("position")
     s.insert(TASKS["posture"], 0)
     assert s.hierarchy(state).names == ("posture", "position", "pointing", "avoidance")
-
-
-def test_a_stack_serves_one_robot_after_another():
-    both = ROBOT, Robot.named("dual_arm")
-    s = Stack([tasks.Posture({})], "velocity")
-    for robot in (*both, *both):  # the target is by name, so each has a row for every joint
-        h = s.hierarchy(State.at(robot, robot.rest))
-        np.testing.assert_array_equal(h.A, np.eye(robot.n))
-        assert s.row_names() == tuple(robot.velocity_names)
-
-
-@pytest.mark.parametrize("level", ["velocity", "acceleration"])
-@pytest.mark.parametrize("task", [tasks.JointDamping(7, 5.0), tasks.JointDamping(7, 2.0, "mass"),
-                                  TASKS["posture"]], ids=["identity", "mass", "posture"])
-def test_a_joint_task_is_the_same_as_a_level_and_as_the_reference(task, level):
-    state = state_at(Q, V)
-    h = Stack([task], level, reference=task).hierarchy(state)
-    expected = (task.reference_velocity(state) if level == "velocity"
-                else task.reference_acceleration(state))
-    np.testing.assert_allclose(h.reference, expected, rtol=1e-14)
-    np.testing.assert_array_equal([h.lower, h.upper], [h.reference] * 2)
-    np.testing.assert_array_equal(h.A, np.eye(7))
-    assert not Stack([task], level).hierarchy(state).reference.any()
 
 
 def test_a_reference_that_is_set_counts_from_the_next_tick_on():

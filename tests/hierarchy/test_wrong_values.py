@@ -111,6 +111,13 @@ def slow(speed):
     return robot
 
 
+def separated(pairs, obstacles):
+    state = State.at(ROBOT, STATE.q)
+    state.measurement = Measurement(8)
+    state.measurement.pairs = pairs
+    return tasks.Separation(SENSOR.points, KEPT, obstacles).rows(state)
+
+
 def limits(**settings):
     return tasks.JointLimits(**({"robot": ROBOT, "acceleration": 10.0, "period": 1e-3} | settings))
 
@@ -248,6 +255,12 @@ def limits(**settings):
     (lambda: tasks.Pointing(FRAME, (0.0, 0.0, 0.0), 0.1), "axis"),
     (lambda: tasks.Avoidance(POINTS, 2), "rows = 2: expected one of 1, 3"),
     (lambda: tasks.Avoidance(POINTS, 1).jacobian(STATE), "no measurement"),
+    (lambda: tasks.Separation(POINTS, KEPT).rows(STATE), "carries no measurement of pairs"),
+    *((lambda pairs=pairs, of=of: separated(pairs, of), said) for pairs, of, said in (
+        (None, 1, "'separation': the state carries no measurement of pairs"),
+        (Pairs(9, 2), 1, "9 points are measured against 2 obstacles, expected 9 against 1"),
+        (Pairs(8, 1), 1, "8 points are measured against 1 obstacles, expected 9"),
+        (Pairs(9, 0), None, "against 0 obstacles, expected 9 against one at least"))),
     *((lambda task=task: task.jacobian(state_at(STATE.q, STATE.v)), f"{len(task.points)} control "
        "points, and distances of 9")  # beyond the end of an array
       for task in (tasks.Avoidance(POINTS[:2]), tasks.CumulatedRepulsion(7, POINTS * 2, 0.1))),

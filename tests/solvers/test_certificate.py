@@ -64,6 +64,7 @@ def candidates(h, answer, r):
 
 # Levels of hierarchies in two unknowns, what is certified, and what is not with the level at fault.
 THIRD = 1e3 / np.sqrt(3.0)
+FREE = (5e-7, -1.0, 0.5)
 UP_TO_ONE = ([[1.0, 0.0]], [-np.inf], [1.0])
 SMALL = {
     "within what the levels above leave": (
@@ -98,7 +99,22 @@ SMALL = {
           [-2e3, -1e3, 1e-3], [-2e3, 0, 2e-3]),
          ([[0, 0, 1e3, 0, 0], [1e-3, 0, 0, 0, 0]], [-1e3, 1e-3], [np.inf, 1e-3])],
         [[1.0, 0.0, -np.sqrt(12.0), -1.0, 1.0]],
-        {(1.0, 0.0, -np.sqrt(12.0) - 1e-5, -1.0, 1.0 + 1e-5): 1})}
+        {(1.0, 0.0, -np.sqrt(12.0) - 1e-5, -1.0, 1.0 + 1e-5): 1}),
+    **{f"rows in units of {unit}": (
+        [(unit * np.eye(2)[:1], [-np.inf], [unit]), (unit * np.eye(2), [5.0 * unit, 2.0 * unit])],
+        [[1.0, 2.0]], {(1.0, 2.1): 1, (0.9, 2.0): 1, (1.1, 2.0): 0})
+       for unit in (1e-170, 1e-20, 1e20, 1e170)},
+    # A level below may use what only nearly parallel rows above can see.
+    **{f"rows at an angle of {angle}": (
+        [([[1.0, 0.0], [1.0, angle]], [1.0, 1.0]), ([[0.0, 1.0]], [0.5])], [[1.0, used]],
+        {(1.0, 0.5 - used): level}) for angle, used, level in (
+            (1e-10, 0.5, 1), (1e-9, 0.5, 1), (1e-7, 0.0, 0), (1e-5, 0.0, 0))},
+    # Two rows that oppose each other see x2 with 1e-6 and x3 with `turn`.
+    **{f"rows that a turn of {turn} explains": (
+        [(np.eye(3), -np.ones(3), np.ones(3)), ([[1, 0, 0], [1, 1e-6, turn]], [1.0, -1.0]),
+         ([[0.0, 0.0, 1.0]], [0.5])],
+        [[0.5 * (1e-6 + turn), -1.0, -1.0], *right], wrong) for turn, right, wrong in (
+            (1e-9, [FREE], {}), (5e-9, [FREE], {}), (1e-7, [], {FREE: 1}))}}
 
 
 @pytest.mark.parametrize("case", SMALL)
@@ -121,17 +137,6 @@ def test_what_is_not_finite_is_never_certified(bad, where):
     h.upper[0] = h.lower[0]
     verdict = certify(h, x)
     assert (verdict.certified, verdict.level) == (False, 0)
-
-
-@pytest.mark.parametrize("unit", [1e-170, 1e-20, 1e20, 1e170])
-def test_units_of_rows_do_not_matter(unit):
-    h = Hierarchy.from_levels([(unit * np.eye(2)[:1], [-np.inf], [unit]),
-                               (unit * np.eye(2), [5.0 * unit, 2.0 * unit])])
-    assert certify(h, [1.0, 2.0]).certified
-    for wrong in ([1.0, 2.1], [0.9, 2.0], [1.1, 2.0]):
-        assert not certify(h, wrong).certified
-    if 1e-100 < unit < 1e100:  # whose squares are doubles too
-        assert prove(h, [[1.0, 2.0]]).x.tolist() == [1.0, 2.0]
 
 
 def test_its_search_for_multipliers_finds_the_least_that_scipys_finds():
@@ -190,17 +195,6 @@ def test_an_answer_for_rows_turned_until_they_depend_is_certified():
         assert not certify(h, x + 1e-5 * np.eye(h.n)[c]).certified
 
 
-@pytest.mark.parametrize(("angle", "counts"), [(1e-10, False), (1e-9, False), (1e-7, True),
-                                               (1e-5, True)])
-def test_rows_count_as_parallel_up_to_an_angle_of_1e_8(angle, counts):
-    """A level below may use what only nearly parallel rows above can see."""
-    above = (np.array([[1.0, 0.0], [1.0, angle]]), [1.0, 1.0])
-    h = Hierarchy.from_levels([above, ([[0.0, 1.0]], [0.5])])
-    assert certify(h, [1.0, 0.0]).certified == counts
-    assert certify(h, [1.0, 0.5]).certified != counts
-    assert certify(h, [1.0, 0.0], parallel=0.1 * angle).certified
-
-
 EXTREMES = (0.0, 5e-324, 1e-310, 1e-200, 1e-160, 1e-8, 1.0, 1e8, 1e153, 1e160, 1.6e308)
 
 
@@ -218,17 +212,6 @@ def test_no_number_is_too_large_or_too_small_to_be_judged(seed):
         assert str(certify(h, x))
 
 
-@pytest.mark.parametrize(("turn", "counts"), [(1e-9, True), (5e-9, True), (1e-7, False)])
-def test_a_level_may_be_as_far_from_optimal_as_a_turn_of_its_rows_explains(turn, counts):
-    """Two rows that oppose each other see x2 with 1e-6 and x3 with `turn`."""
-    bounds = (np.eye(3), -np.ones(3), np.ones(3))
-    level = (np.array([[1.0, 0.0, 0.0], [1.0, 1e-6, turn]]), [1.0, -1.0])
-    h = Hierarchy.from_levels([bounds, level, ([[0.0, 0.0, 1.0]], [0.5])])
-    free, exact = [5e-7, -1.0, 0.5], [0.5 * (1e-6 + turn), -1.0, -1.0]
-    assert certify(h, free).certified == counts
-    assert certify(h, exact).certified
-
-
 @pytest.mark.parametrize(("stationarity", "nearest", "verdict"), [
     (1e-6, 1e-6, "certified: optimal at every level and nearest to the reference, to 1.0e-06"),
     (1e-6, 2e-6, "optimal at every level, but not nearest to the reference: residual 2.0e-06, "
@@ -244,28 +227,6 @@ def test_a_residual_may_be_the_tolerance_and_no_more(stationarity, nearest, verd
         "yes" if one <= 1e-6 else "no" for one in (0.0, stationarity, nearest)]
 
 
-def test_a_wrong_candidate_proves_nothing_and_a_metric_is_refused():
-    h = Hierarchy.from_levels([(np.eye(2), [-1.0, -1.0], [1.0, 1.0]), ([[1.0, 1.0]], [3.0])])
-    wrong = prove(h, [[1.0, 0.0]])
-    assert (wrong.complete, wrong.proved) == (False, 1)  # the box is kept, the sum can be larger
-    assert np.isnan(wrong.x).all()
-    right = prove(h, [[1.0, 0.0], [1.0, 1.0]])
-    assert right.complete
-    np.testing.assert_array_equal(right.x, [1.0, 1.0])
-    np.testing.assert_array_equal(right.least, [0.0, 1.0])
-    refused("metric", lambda: prove(h.changed(metric=np.diag([1.0, 2.0])), [[1.0, 0.0]]))
-
-
-@pytest.mark.parametrize(("off", "gap"), [
-    (0.0, 1.0), (5e-9, 5e-8), (5e-8, 5e-7), (5e-7, 1.0), (0.0, 5e-9), (0.0, 5e-11)])
-def test_a_candidate_may_be_off_a_side_where_no_other_is_as_near(off, gap):
-    h = Hierarchy.from_levels([(np.eye(2), [-9.0] * 2, [1.0] * 2), (np.eye(2), [5.0, 1.0 - gap])])
-    found = prove(h, [[1.0 + off, 1.0 - gap]], unclear=1e-13)
-    assert (found.complete, found.shift, found.turn) == (True, 0.0, 0.0)
-    np.testing.assert_array_equal(found.x, [1.0, 1.0 - gap])
-    assert not prove(h, [[1.0 + 1e-5, 1.0 - gap]], unclear=1e-13).complete
-
-
 @pytest.mark.parametrize(("row", "low", "up", "x"), [
     (1.0, 1.0, 0.0, 0.5), (1.0, np.nan, 1.0, 0.0), (0.0, np.nan, 0.0, 0.0)])
 def test_sides_that_cross_or_are_no_numbers_leave_nothing_to_certify_or_prove(row, low, up, x):
@@ -276,22 +237,43 @@ def test_sides_that_cross_or_are_no_numbers_leave_nothing_to_certify_or_prove(ro
     assert prove(h, [[x]]).proved == 0
 
 
-# Squares out of range counted as zero: the reference was proved to be the answer. The last
-# candidate says only that the row is an equality.
-@pytest.mark.parametrize(("size", "candidate"), [
-    (1e200, [1.0, 4.0]), (1e-170, [1.0, 4.0]), (1.0, [1.0, 0.0])])
-def test_the_answer_of_a_row_of_any_size_is_proved_to_be_nearest_to_the_reference(size, candidate):
-    h = Hierarchy.from_levels([([[size, 0.0]], [size])], reference=[3.0, 4.0])
-    assert not prove(h, [[1.0, np.nan], [7.0, 7.0], [1.0]]).turn
-    np.testing.assert_array_equal(prove(h, [candidate]).x, [1.0, 4.0])
+BOX, EYE = (np.eye(2), [-1.0, -1.0], [1.0, 1.0]), np.eye(2)
+CLEAR = {"complete": True, "turn": 0.0}
+PROVED = {
+    "the box is kept, and the sum can be larger": (
+        [BOX, ([[1.0, 1.0]], [3.0])], [[1.0, 0.0]], {"complete": False, "proved": 1,
+                                                    "x": [np.nan] * 2}),
+    "one candidate of two": (
+        [BOX, ([[1.0, 1.0]], [3.0])], [[1.0, 0.0], [1.0, 1.0]], {**CLEAR, "x": [1.0, 1.0],
+                                                                 "least": [0.0, 1.0]}),
+    # A candidate may be off a side where no other is as near.
+    **{f"off a side by {off} where the next is at {gap}": (
+        [(EYE, [-9.0] * 2, [1.0] * 2), (EYE, [5.0, 1.0 - gap])], [[1.0 + off, 1.0 - gap]],
+        {"complete": False} if off > 1e-6 else {**CLEAR, "shift": 0.0, "x": [1.0, 1.0 - gap]})
+       for off, gap in ((0.0, 1.0), (5e-9, 5e-8), (5e-8, 5e-7), (5e-7, 1.0), (0.0, 5e-9),
+                        (0.0, 5e-11), (1e-5, 1.0), (1e-5, 5e-7))},
+    # Squares out of range counted as zero: the reference was proved to be the answer.
+    **{f"a row of {size}": ([([[size, 0.0]], [size])], [[1.0, 4.0]], {"x": [1.0, 4.0]})
+       for size in (1e200, 1e-170)},
+    "a candidate that says only that the row is an equality": (
+        [([[1.0, 0.0]], [1.0])], [[1.0, 0.0]], {**CLEAR, "x": [1.0, 4.0]}),
+    "candidates that are none": (
+        [([[1.0, 0.0]], [1.0])], [[1.0, np.nan], [7.0, 7.0], [1.0]], {"turn": 0.0}),
+    "rows at a tiny angle make the levels below ill-posed": (
+        [([[1.0, 0.0], [1.0, 1e-9]], [1.0, 1.0]), ([[0.0, 1.0]], [5.0])], [[1.0, 5.0]],
+        {"posed": 1, "proved": 3, "judged": 1}),
+    "rows at an angle": ([([[1.0, 0.0], [1.0, 1e-3]], [1.0, 1.0]), ([[0.0, 1.0]], [5.0])],
+                         [[1.0, 0.0]], {**CLEAR, "posed": 3, "least": [0.0, 5.0]}),
+    **{f"rows in units of {unit}": (SMALL[f"rows in units of {unit}"][0], [[1.0, 2.0]],
+                                    {"x": [1.0, 2.0]}) for unit in (1e-20, 1e20)}}
 
 
-def test_rows_at_a_tiny_angle_make_the_levels_below_ill_posed():
-    h = Hierarchy.from_levels([([[1.0, 0.0], [1.0, 1e-9]], [1.0, 1.0]), ([[0.0, 1.0]], [5.0])])
-    found = prove(h, [[1.0, 5.0]])
-    assert (found.posed, found.proved, found.judged) == (1, 3, 1)
-    assert 1e-10 < found.turn < 1e-8
-    clear = Hierarchy.from_levels([([[1.0, 0.0], [1.0, 1e-3]], [1.0, 1.0]), ([[0.0, 1.0]], [5.0])])
-    found = prove(clear, [[1.0, 0.0]])
-    assert (found.posed, found.complete, found.turn) == (3, True, 0.0)
-    np.testing.assert_array_equal(found.least, [0.0, 5.0])
+@pytest.mark.parametrize("case", PROVED)
+def test_what_a_candidate_proves(case):
+    levels, candidates, expected = PROVED[case]
+    h = Hierarchy.from_levels(levels, [0.0, 0.0] if len(levels) > 1 else [3.0, 4.0])
+    found = prove(h, candidates, **{"unclear": 1e-13} if case.startswith("off") else {})
+    for name, value in expected.items():
+        np.testing.assert_array_equal(getattr(found, name), value)
+    assert "ill-posed" not in case or 1e-10 < found.turn < 1e-8
+    refused("metric", prove, h.changed(metric=np.diag([1.0, 2.0])), candidates)

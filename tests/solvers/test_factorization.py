@@ -4,12 +4,10 @@ import copy
 
 import numpy as np
 import pytest
-from rank_cases import CASES, build
 from refusals import refused
 
 from solvers import Status, certify, make, problems
 from solvers.factorization import Factorization
-from solvers.resolvers.tpm import task_priority_matrix
 
 
 def new_rows(size, factored, rng):
@@ -88,19 +86,6 @@ def test_rounding_is_no_rank(tolerance):
     levels = [A[:3], A[3:]]
     factored = Factorization(levels, settings=make("tpm", rank_tolerance=tolerance))
     assert factored.ranks == (3, 1)
-
-
-@pytest.mark.parametrize("case", CASES)
-def test_f_and_g_are_those_of_the_matrix_made_from_the_rows(case):
-    factored = Factorization.of(build(case, True))
-    for _ in range(2):
-        expected = task_priority_matrix(factored.hierarchy(np.zeros(factored.m)))
-        if factored.m:
-            size = 1.0 + np.abs(expected.G).max()
-            assert np.abs(factored.F - expected.F).max() < 1e-9 * size
-            assert np.abs(factored.G - expected.G).max() < 1e-9 * size
-            assert np.abs(factored.rows @ factored.G - factored.F).max() < 1e-9 * size
-        factored.reorder(factored.names[::-1])
 
 
 @pytest.mark.filterwarnings("ignore:overflow")  # of the kernels as plain Python

@@ -263,6 +263,16 @@ SAWYER = [[-0.1603, 0.0, -E, 0.0, -E, 0.0, -E, 0.0], [1.0155, 0.0, 0.0, E, 0.0, 
     ("hcod", problems.generate(961_000_691), Status.SOLVED),
     # Signs that rounding of large multipliers may decide: SOLVED, and a level was missed by 1e-5.
     *(("hcod", problems.structured(seed, ["nearly_parallel"]), Status.INACCURATE)
-      for seed in (1006200299, 1008024437, 1009027092))])
-def test_what_rounding_makes_hard_is_solved_or_said_to_be_inaccurate(name, h, status):
-    assert make(name).solve(h).status is status
+      for seed in (1006200299, 1008024437, 1009027092)),
+    *(("hcod", problems.structured(seed, ["nearly_parallel"]), Status.SOLVED) for seed in (
+        # Multipliers of 1e7 round off by 1e-8 of the level: INACCURATE, and x off by up to 0.5.
+        1010000011, 1010000109, 1010000484, 1010000703,
+        # In these another row was off its side by less than is forgiven.
+        1007015786, 1008029551,
+        # Rows at 2e-9 to 9e-9 rad were INACCURATE where others were at less than 5,000 times that.
+        1010000010, 1010000106, 1010000358, 1010000425))])
+def test_what_rounding_makes_hard_is_right_or_said_to_be_inaccurate(name, h, status):
+    res = make(name).solve(h)
+    assert res.status is status
+    for x in (res.x, make(name).solve(h, res.memory).x):
+        assert status is not Status.SOLVED or is_right(h, x)

@@ -80,13 +80,6 @@ def test_a_copy_and_a_pickle_pass_the_gate_too(again):
     assert (other.names, make("hcod").solve(other).status.name) == (h.names, "SOLVED")
 
 
-def test_a_violation_is_the_distance_to_the_rows_interval():
-    h = Hierarchy.from_levels([([[1, 0], [0, 1]], [3, 4]), ([[1, 0]], [-1], [1]),
-                               ([[0, 1]], [2], [np.inf])])
-    np.testing.assert_allclose(h.violations([0, 0]), [5, 0, 2])
-    np.testing.assert_allclose(h.slacks([2, 0]), [-1, -4, 1, -2])
-
-
 @pytest.mark.parametrize(("levels", "give", "said"), [
     ([([[np.inf, 0]], [1])], None, "A[0, 0] is inf"),
     ([(np.eye(2), [1, np.inf])], None, "level 1, row 1"),

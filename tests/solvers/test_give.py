@@ -44,26 +44,6 @@ def test_a_level_gives_up_to_what_it_may_and_those_below_gain(resolver, seed):
     assert lower[first] < were[first] - 1e-3
 
 
-@pytest.mark.parametrize(("reach", "met"), [(0.3, True), (8.0, False)])
-def test_any_memory_gives_the_same_answer_and_its_own_fewer_iterations(reach, met):
-    """Levels that are met share a witness, others have their own.
-
-    Of two tasks that give, the second is met while the first leaves it room.
-    """
-    A, B = np.random.default_rng(4).normal(size=(2, 2, 6))
-    levels = [(np.eye(6), np.full(6, -1.0), np.full(6, 1.0)), (A, np.full(2, reach)),
-              (B, np.full(2, 0.1)), (np.eye(6), np.full(6, 0.2))]
-    h, hcod = Hierarchy.from_levels(levels, give=[0.0, 0.1, 0.1, 0.0]), make("hcod")
-    cold = hcod.solve(h)
-    warm = hcod.solve(h, cold.memory)
-    np.testing.assert_allclose(warm.x, cold.x, atol=1e-12)
-    assert warm.iterations <= cold.iterations
-    assert certify(h, warm.x, witnesses=warm.witnesses).certified
-    assert (warm.active.shape, np.array_equal(*cold.witnesses)) == ((h.m,), met)
-    for memory in (np.zeros(0), np.full(7, 9.0), hcod.solve(h.changed(give=None)).memory):
-        np.testing.assert_allclose(hcod.solve(h, memory).x, cold.x, atol=1e-9)
-
-
 @pytest.mark.parametrize("metric", [None, np.eye(6)], ids=["one call", "in parts"])
 @pytest.mark.parametrize("most", [1, 2])
 def test_a_search_for_a_witness_goes_on_from_where_the_limit_ended_it(metric, most):
@@ -279,22 +259,3 @@ def test_in_a_metric_the_memory_of_a_plugin_stays_as_it_is():
 
     res = Own().solve(Hierarchy.from_levels([([[1.0, 2.0]], [1.0])], metric=np.diag([4.0, 1.0])))
     np.testing.assert_allclose(res.memory, [2.0 * res.x[0], res.x[1]])
-
-
-@pytest.mark.parametrize("inaccurate", [None, 0, 1])
-def test_a_part_that_is_inaccurate_makes_the_whole_so_and_each_part_goes_on_from_its_memory(
-        inaccurate):
-    hcod, asked = make("hcod"), []
-
-    def solve(part, memory):
-        found = hcod.solve(part, memory)
-        asked.append(memory)
-        if len(asked) - 1 == inaccurate:
-            found.status = Status.INACCURATE
-        return found
-
-    first = giving(solve, problem(1, 0.1), [1], None)
-    assert first.status is (Status.SOLVED if inaccurate is None else Status.INACCURATE)
-    assert asked == [None, None]
-    giving(solve, problem(1, 0.1), [1], first.memory)
-    assert [memory.size for memory in asked[2:]] == first.memory[-2:].tolist()

@@ -13,25 +13,9 @@ from standing import ROBOT as HUMANOID
 from standing import WEIGHT, feet, standing_stack
 from urdf_text import LIMIT, joint, link, loaded, placed
 
-from hierarchy import Hierarchy, Robot, State
+from hierarchy import Hierarchy, Robot, State, tasks
 from hierarchy.avoidance import Barrier
 from hierarchy.paths import Still, circle
-from hierarchy.tasks import (
-    Along,
-    FrameLog,
-    JointCoupling,
-    JointLimits,
-    Manipulability,
-    Momentum,
-    Orientation,
-    Pose,
-    Position,
-    Posture,
-    RelativePose,
-    SelfSeparation,
-    Together,
-    model_rows,
-)
 from solvers import Status, certify, explain, make, solve_ik
 from solvers.ik import _of_thread
 from solvers.qp.backends import installed
@@ -40,14 +24,15 @@ from solvers.reaching import _above
 Q = np.array([0.9, -0.9, 0.9, 1.2, 1.0, 1.0, 0.3])
 AT = State.at(ROBOT, Q)
 ELBOW = ROBOT.frame("joint_4")
-HOME, HIGH = Posture(tuple(Q), gain=2.0), Posture((0.5,) * 7)
+TURN = np.array([[-1, -2, 2], [2, 1, 2], [-2, 2, 1]]) / 3.0
+HOME, HIGH = tasks.Posture(tuple(Q), gain=2.0), tasks.Posture((0.5,) * 7)
 
 
-def follow(tasks, ticks, dt=0.01, **settings):
+def follow(wanted, ticks, dt=0.01, **settings):
     """Return q and velocities (ticks, n) of a robot that obeys at once."""
     q, memory, v = Q, None, []
     for _ in range(ticks):
-        step = solve_ik(ROBOT, q, tasks, dt=dt, memory=memory, **settings)
+        step = solve_ik(ROBOT, q, wanted, dt=dt, memory=memory, **settings)
         assert step.status is Status.SOLVED
         memory, q = step.memory, ROBOT.integrate(q, step.v * dt)
         v.append(step.v)
@@ -58,10 +43,10 @@ def follow(tasks, ticks, dt=0.01, **settings):
     {}, {"dt": 0.02}, {"damping": 3.0}, {"limits": False}, {"resolver": "tpm"},
     {"tasks": [HOME]}, {"robot": Robot.load("kuka_lwr")}])
 def test_what_a_call_has_set_up_serves_the_same_objects_and_changes_no_answer(changed):
-    tasks = [Position(FRAME, circle((0.3, 0.5, 0.1), 0.1, rate=2.0)), HOME]
+    goals = [tasks.Position(FRAME, circle((0.3, 0.5, 0.1), 0.1, rate=2.0)), HOME]
     memory, q = None, Q
     for t in (0.0, 0.01, 0.02, 0.03):
-        asked = {"robot": ROBOT, "q": q, "tasks": tasks, "t": t, **(changed if t > 0.02 else {})}
+        asked = {"robot": ROBOT, "q": q, "tasks": goals, "t": t, **(changed if t > 0.02 else {})}
         kept = dict(vars(_of_thread).get("kept", {}))
         refused("q[3] (joint_4) is nan", solve_ik, memory=memory,
                 **asked | {"q": np.where(Q == 1.2, np.nan, Q)})
@@ -85,8 +70,8 @@ def test_what_is_kept_serves_one_call_at_a_time_and_tasks_of_its_size():
 
     changing = of_user("changing", 3, error, lambda state: there.jacobian(state)[
         :changing.dimension], gain=2.0)
-    tasks = [changing, Posture(tuple(Q + 0.05))]
-    ask = partial(solve_ik, ROBOT, tasks=tasks)
+    wanted = [changing, tasks.Posture(tuple(Q + 0.05))]
+    ask = partial(solve_ik, ROBOT, tasks=wanted)
     plain = [ask(Q).v for _ in range(2)][-1]
     again.append(ask)
     np.testing.assert_array_equal(ask(Q).v, plain)
@@ -95,37 +80,38 @@ def test_what_is_kept_serves_one_call_at_a_time_and_tasks_of_its_size():
     np.testing.assert_allclose(changing.jacobian(AT) @ ask(Q).v, 2.0 * changing.error(AT))
     aims = (list(Q), np.asfortranarray(AT.rotation(FRAME)), np.array([1.0, 2.0, 3.0]),
             np.eye(3)[:1].copy(), np.array([0.3, 0.0, 0.0]))
-    tasks[:] = (Along(resting([0.3, 0.5, 0.1], gain=aims[2]), aims[3]), Posture(aims[0]),
-                Momentum("linear", aims[4]), Orientation(FRAME, aims[1]))
+    wanted[:] = (tasks.Along(resting([0.3, 0.5, 0.1], gain=aims[2]), aims[3]),
+                 tasks.Posture(aims[0]), tasks.Momentum("linear", aims[4]),
+                 tasks.Orientation(FRAME, aims[1]))
     for aim in aims:
         ask(Q)
         aim[:] = np.roll(aim, 1, axis=-1)
-        np.testing.assert_array_equal(ask(Q).v, solve_ik(ROBOT, Q, deepcopy(tasks)).v)
+        np.testing.assert_array_equal(ask(Q).v, solve_ik(ROBOT, Q, deepcopy(wanted)).v)
 
 
 def test_a_call_neither_names_the_pairs_of_links_nor_compares_them(monkeypatch):
     """A thousand pairs cost 1 ms in every call, ten times their rows."""
-    apart = SelfSeparation.of(ROBOT, Barrier(0.02))
+    apart = tasks.SelfSeparation.of(ROBOT, Barrier(0.02))
     assert isinstance(apart.pairs, tuple)  # which cannot change, as a list can
-    solve_ik(ROBOT, Q, tasks := [apart])
-    monkeypatch.delattr(SelfSeparation, "row_names")
-    assert solve_ik(ROBOT, Q, tasks).status is Status.SOLVED
+    solve_ik(ROBOT, Q, wanted := [apart])
+    monkeypatch.delattr(tasks.SelfSeparation, "row_names")
+    assert solve_ik(ROBOT, Q, wanted).status is Status.SOLVED
 
 
 def test_a_call_writes_out_no_task_of_a_level_but_sees_another_one_there(monkeypatch):
     """To see whether the list had changed it wrote out all of them: four cost 0.9 ms."""
-    level = [Position(FRAME, Still([0.3, 0.5, 0.1])), Posture(tuple(Q))]
-    ask = partial(solve_ik, ROBOT, Q, [Together(level)])
+    level = [tasks.Position(FRAME, Still([0.3, 0.5, 0.1])), tasks.Posture(tuple(Q))]
+    ask = partial(solve_ik, ROBOT, Q, [tasks.Together(level)])
     ask()
-    monkeypatch.setattr(Position, "__repr__", None)  # cannot be called
+    monkeypatch.setattr(tasks.Position, "__repr__", None)  # cannot be called
     plain = ask().v
-    level[0] = Position(FRAME, Still([0.3, 0.5, 0.2]))
-    np.testing.assert_array_equal(ask().v, solve_ik(ROBOT, Q, [Together(tuple(level))]).v)
+    level[0] = tasks.Position(FRAME, Still([0.3, 0.5, 0.2]))
+    np.testing.assert_array_equal(ask().v, solve_ik(ROBOT, Q, [tasks.Together(tuple(level))]).v)
     assert np.abs(ask().v - plain).max() > 0.1
 
 
 def test_limits_of_the_robot_hold_whatever_is_asked():
-    far = Posture(tuple(ROBOT.upper + 1.0), gain=50.0)
+    far = tasks.Posture(tuple(ROBOT.upper + 1.0), gain=50.0)
     assert (np.abs(solve_ik(ROBOT, Q, [far]).v) <= ROBOT.velocity_limit + 1e-12).all()
     q, _ = follow([far], 300)
     assert (q <= ROBOT.upper + 1e-9).all()
@@ -145,30 +131,37 @@ ASKED = {
                         np.inf),
     # Joints reversed 1 rad/s in each tick, with status SOLVED: below levels that decide a part of
     # the residual, and about the axis of an arm that is almost straight.
-    "turned": ([Orientation(FRAME, np.array([[-1, -2, 2], [2, 1, 2], [-2, 2, 1]]) / 3.0, gain=5.0),
-                resting([1.32, 1.26, 0.04], gain=5.0),
+    "turned": ([tasks.Orientation(FRAME, TURN, gain=5.0), resting([1.32, 1.26, 0.04], gain=5.0),
                 resting([-0.06, -0.69, -0.03], ELBOW, gain=2.0, name="elbow")],
                1000, 0.01, {}, 1e-3, np.inf),
     "straight": ([resting([0.84, -0.66, 1.09], gain=2.0),
                   resting([-0.11, 0.53, 0.57], ELBOW, gain=5.0, name="elbow"),
-                  Posture((0.96, 0.66, -1.7, -1.2, -1.5, 0.27, 0.3), gain=1.0)],
+                  tasks.Posture((0.96, 0.66, -1.7, -1.2, -1.5, 0.27, 0.3), gain=1.0)],
                  1000, 0.01, {}, 1e-3, np.inf),
     # Rows that vanish where they reach the most: all joints reversed their full speed.
-    "height": ([Along(resting([0.3, 0.5, 2.0], gain=2.0), [(0.0, 0.0, 1.0)]), HIGH], 600, 0.04, {},
-               0.05, 1e-4),
-    "direction": ([Along(resting([-0.3, 1.5, 2.0], ELBOW, gain=2.0), [(0.6, 0.8, 0.0)]), HIGH],
-                  600, 0.04, {}, 0.05, 1e-4),
-    "inequality": ([Manipulability(FRAME, least=0.5), HIGH], 600, 0.04, {}, 0.05, 1e-4)}
+    "height": ([tasks.Along(resting([0.3, 0.5, 2.0], gain=2.0), [(0.0, 0.0, 1.0)]), HIGH],
+               600, 0.04, {}, 0.05, 1e-4),
+    "direction": ([tasks.Along(resting([-0.3, 1.5, 2.0], ELBOW, gain=2.0), [(0.6, 0.8, 0.0)]),
+                   HIGH], 600, 0.04, {}, 0.05, 1e-4),
+    "inequality": ([tasks.Manipulability(FRAME, least=0.5), HIGH], 600, 0.04, {}, 0.05, 1e-4),
+    # Half of the ticks at rest were INACCURATE: the residual depended on the limits that act.
+    **{f"kept by limits {k}": ([resting(there, gain=10.0), HIGH], 400, 0.01, {}, 1e-3, np.inf)
+       for k, there in enumerate(([0.08, 0.24, -0.18], [0.22, -0.14, 0.03]))},
+    # What the hand leaves of joints that are held is singular where the arm beyond them is
+    # stretched: every joint reversed its full speed in each tick, and the hand stayed away.
+    **{f"held below, {k}": ([resting(there), tasks.Together([
+        tasks.JointCoupling(ROBOT, {f"joint_{i}": 1.0}, Q[i - 1]) for i in (1, 2, 3)])],
+        300, 0.01, {}, 1e-3, 1e-9) for k, there in enumerate(([0.3, 0.5, 0.1], [0.5, 0.3, 0.3]))}}
 
 
 @pytest.mark.parametrize("case", ASKED)
 def test_an_arm_asked_for_what_is_out_of_reach_comes_to_rest_as_near_as_it_can(case):
-    tasks, ticks, dt, settings, most, better = ASKED[case]
-    q, v = follow(tasks, ticks, dt, **settings)
+    wanted, ticks, dt, settings, most, better = ASKED[case]
+    q, v = follow(wanted, ticks, dt, **settings)
     assert np.abs(np.diff(v[100 - ticks:][-100:], axis=0)).max() < most
-    missed = np.linalg.norm(tasks[0].error(State.at(ROBOT, q)))
+    missed = np.linalg.norm(wanted[0].error(State.at(ROBOT, q)))
     for near in q + np.random.default_rng(0).normal(scale=0.03, size=(50, 7)):
-        assert np.linalg.norm(tasks[0].error(State.at(ROBOT, near))) > missed - better
+        assert np.linalg.norm(wanted[0].error(State.at(ROBOT, near))) > missed - better
 
 
 @pytest.mark.parametrize("bend", [1e-3, 1e-4])
@@ -176,14 +169,14 @@ def test_no_demand_moves_a_nearly_stretched_arm_faster_than_its_curvature_allows
     """Demands below 1 mm/s were met in full: at 6 rad/s for 0.1 mm/s."""
     q = np.array([0.0, 0.5, 0.0, bend, 0.0, bend, 0.0])
     at = State.at(ROBOT, q).position(FRAME)
-    out, sigma, _ = np.linalg.svd(Position(FRAME, Still(at)).jacobian(State.at(ROBOT, q)))
+    out, sigma, _ = np.linalg.svd(tasks.Position(FRAME, Still(at)).jacobian(State.at(ROBOT, q)))
     for demand in np.geomspace(1e-7, 0.1, 7):
         hand = resting(at + demand * out[:, 2], gain=1.0)
         v = solve_ik(ROBOT, q, [hand], limits=False).v
         assert np.linalg.norm(v) <= 1.01 * sigma[2] / (0.005 * np.linalg.norm(sigma))
 
 
-class Near(Along):
+class Near(tasks.Along):
     """A height that a user's task knows about Q only."""
 
     def jacobian(self, state):
@@ -195,17 +188,7 @@ class Near(Along):
 def test_a_row_that_is_known_at_q_only_is_resolved_there():
     height = resting([0.3, 0.5, 0.7], gain=2.0), [(0.0, 0.0, 1.0)]
     np.testing.assert_allclose(solve_ik(ROBOT, Q, [Near(*height)]).v,
-                               solve_ik(ROBOT, Q, [Along(*height)]).v, atol=1e-9)
-
-
-@pytest.mark.parametrize("goal", [[0.3, 0.5, 0.1], [0.5, 0.3, 0.3]])
-def test_joints_that_are_held_below_the_hand_come_to_rest_where_they_must_move(goal):
-    """What the hand leaves of their rows is singular where the arm beyond them is stretched: every
-    joint reversed its full speed in each tick, with status SOLVED, and the hand stayed away."""
-    held = [JointCoupling(ROBOT, {f"joint_{i}": 1.0}, Q[i - 1]) for i in (1, 2, 3)]
-    q, v = follow([resting(goal), Together(held)], 300)
-    assert np.abs(np.diff(v[-100:], axis=0)).max() < 1e-3
-    np.testing.assert_allclose(State.at(ROBOT, q).position(FRAME), goal, atol=1e-6)
+                               solve_ik(ROBOT, Q, [tasks.Along(*height)]).v, atol=1e-9)
 
 
 def test_the_answer_near_a_singularity_is_continuous():
@@ -217,7 +200,7 @@ def test_the_answer_near_a_singularity_is_continuous():
 
 
 def test_limits_of_acceleration_continue_from_the_tick_before():
-    limits, far = JointLimits(ROBOT, 10.0, 0.01), resting([0.3, 0.5, 0.1])
+    limits, far = tasks.JointLimits(ROBOT, 10.0, 0.01), resting([0.3, 0.5, 0.1])
     q, v = Q, np.zeros(7)
     for _ in range(100):
         step = solve_ik(ROBOT, q, [far], limits=limits, v=v)
@@ -239,16 +222,16 @@ def test_degrees_are_asked_about(tmp_path):
     with pytest.warns(UserWarning, match="joint_1 at 51.56.* its limits, -2.967 to 2.967. Are"):
         solve_ik(ROBOT, np.degrees(Q), task)
     slide = two_joints(tmp_path, LIMIT, LIMIT, "prismatic")
-    solve_ik(slide, [30.0, 0.0], [Posture((0.0, 0.0))])  # no angle: pytest raises warnings
+    solve_ik(slide, [30.0, 0.0], [tasks.Posture((0.0, 0.0))])  # no angle: pytest raises warnings
 
 
 def test_poses_of_random_configurations_are_found_within_the_limits():
     rng = np.random.default_rng(3)
     for _ in range(10):
         goal = State.at(ROBOT, rng.uniform(ROBOT.lower, ROBOT.upper))
-        pose = Pose(FRAME, Still(goal.position(FRAME)), goal.rotation(FRAME))
-        twice = [Position(FRAME, pose.path), pose]  # what is met to 1e-17 beats no other start
-        assert solve_ik(ROBOT, Q, twice, until=1e-6).met
+        pose = tasks.Pose(FRAME, Still(goal.position(FRAME)), goal.rotation(FRAME))
+        twice = [tasks.Position(FRAME, pose.path), pose]
+        assert solve_ik(ROBOT, Q, twice, until=1e-6).met  # to 1e-17, which beats no other start
         found = solve_ik(ROBOT, Q, [pose], until=1e-6)
         assert (found.met, found.verdict) == (True, "reached")
         assert found.iterations > 0
@@ -280,9 +263,9 @@ def test_a_configuration_does_not_depend_on_the_gains_of_its_tasks():
 
 
 @pytest.mark.parametrize("make_task", [
-    lambda path: Position(FRAME, path), lambda path: FrameLog(FRAME, path, np.eye(3)),
-    lambda path: Together([Position(FRAME, path), Orientation(FRAME, np.eye(3))]),
-    lambda path: Along(Position(FRAME, path), ((0.6, 0.0, 0.8), (0.0, 1.0, 0.0)))])
+    lambda path: tasks.Position(FRAME, path), lambda path: tasks.FrameLog(FRAME, path, np.eye(3)),
+    lambda path: tasks.Together([tasks.Position(FRAME, path), tasks.Orientation(FRAME, np.eye(3))]),
+    lambda path: tasks.Along(tasks.Position(FRAME, path), ((0.6, 0.0, 0.8), (0.0, 1.0, 0.0)))])
 def test_a_target_that_moves_is_reached_where_it_is_at_that_time(make_task):
     found = solve_ik(ROBOT, Q, [make_task(circle([0.3, 0.4, 0.3], 0.1))], until=1e-6, t=0.3)
     assert (found.verdict, found.starts) == ("reached", 1)
@@ -294,10 +277,10 @@ def test_two_hands_on_an_object_take_it_as_near_to_a_target_out_of_reach_as_they
     robot = Robot.load("dual_arm")
     home, (right, left) = State.at(robot, robot.rest), map(robot.frame, ("right_hand", "left_hand"))
     R = home.rotation(right).T
-    grip = RelativePose(left, right, R @ (home.position(left) - home.position(right)),
+    grip = tasks.RelativePose(left, right, R @ (home.position(left) - home.position(right)),
                         R @ home.rotation(left))
     goal = resting(home.position(right) + np.array([0.45, 0.3, 0.1]), right, name="object")
-    found = solve_ik(robot, robot.rest, [grip, goal, Posture(tuple(robot.rest))], until=until)
+    found = solve_ik(robot, robot.rest, [grip, goal, tasks.Posture(tuple(robot.rest))], until=until)
     assert not found.met
     assert found.errors["relative"] <= until
     assert found.errors["object"] < 0.08
@@ -305,7 +288,7 @@ def test_two_hands_on_an_object_take_it_as_near_to_a_target_out_of_reach_as_they
 
 def test_joints_that_do_not_help_stay_though_a_target_is_out_of_reach():
     """The best of the random starts was the answer, by less than rounding."""
-    far = RelativePose(FRAME, ROBOT.frame("joint_3"), (0.0, 0.0, 5.0))
+    far = tasks.RelativePose(FRAME, ROBOT.frame("joint_3"), (0.0, 0.0, 5.0))
     found = solve_ik(ROBOT, Q, [far], until=1e-6)
     assert not found.met
     np.testing.assert_allclose(found.q[:3], Q[:3], atol=1e-9)
@@ -337,7 +320,7 @@ def test_beyond_a_curved_bound_the_nearest_point_on_it_is_found():
 def test_a_level_above_holds_back_what_would_leave_a_side_without_room(sides, wanted, holds):
     level = ([[2.0, 0.0], [0.0, 0.0]], *np.array([sides, (0.0, 0.0)]).T)
     h = Hierarchy.from_levels([level, level, ([[1.0, 0.0]], [9.0])], names=["own", "box", "hand"])
-    own = Posture(tuple(Q), name="own")
+    own = tasks.Posture(tuple(Q), name="own")
     assert _above(h, 2, np.array(wanted), [own]) == ["box"] * holds
     assert _above(h, 1, np.array(wanted), []) == ["own"] * holds
 
@@ -353,15 +336,14 @@ def test_what_holds_a_target_out_of_reach_back_is_said():
     assert solve_ik(ROBOT, Q, [idle], until=1e-3).verdict.endswith(
         ": its rows ask for no velocity, its gain is 0")
     here = State.at(ROBOT, Q).position(FRAME)
-    tasks = [JointCoupling(ROBOT, {"joint_7": 1.0}, Q[6]),  # which holds nothing back
+    wanted = [tasks.JointCoupling(ROBOT, {"joint_7": 1.0}, Q[6]),  # which holds nothing back
              resting(here), resting(here + 0.1, name="other")]
     assert "other is missed by 0.173, held back by position" in solve_ik(
-        ROBOT, Q, tasks, until=1e-6).verdict
-    found = solve_ik(ROBOT, Q, [tasks[2], Posture(tuple(Q))], resolver="augmented", limits=False,
-                     until=1e-6)
+        ROBOT, Q, wanted, until=1e-6).verdict
+    found = solve_ik(ROBOT, Q, [wanted[2], HOME], resolver="augmented", limits=False, until=1e-6)
     assert found.verdict.endswith("augmented is not strict, and may trade it for other tasks")
     here[0] = np.nan  # it raised StopIteration
-    refused("'position': its error is not finite: [nan", solve_ik, ROBOT, Q, tasks[1:2], until=1e-6)
+    refused("its error is not finite: [nan", solve_ik, ROBOT, Q, wanted[1:2], until=1e-6)
 
 
 CONTACTS = feet()
@@ -389,13 +371,6 @@ def physical(stack, fraction=1.0):
     assert (np.abs(torques) <= fraction * HUMANOID.effort_limit[6:] + 1e-7).all()
     assert (np.linalg.norm(forces[:, :2], axis=1) <= 0.7 * forces[:, 2] + 1e-7).all()
     return h, res
-
-
-@pytest.mark.parametrize("target", [[0.08, 0.24, -0.18], [0.22, -0.14, 0.03]])
-def test_an_arm_that_its_limits_keep_from_a_target_rests_with_every_tick_verified(target):
-    """Half of the ticks at rest were INACCURATE: the residual depended on the limits that act."""
-    _, v = follow([resting(target, gain=10.0), HIGH], 400)
-    assert np.abs(v[-1]).max() < 0.01
 
 
 @pytest.mark.parametrize("faces", [4, 8])
@@ -432,7 +407,7 @@ def test_an_arm_with_a_motor_before_a_gear_moves_as_one_without(tmp_path):
         step = solve_ik(robot, robot.rest, [task], limits=False)
         speeds.append(step.v[robot.velocity_names.index("only")])
     assert speeds[1] == pytest.approx(speeds[0], rel=1e-3)
-    assert model_rows(robot)[0].straight  # as scenarios ask, whose stack has these rows
+    assert tasks.model_rows(robot)[0].straight  # as scenarios ask, whose stack has these rows
 
 
 def two_joints(folder, first, second, kind="revolute"):
@@ -468,7 +443,7 @@ def test_a_slide_with_one_limit_starts_again_within_it(tmp_path, lower, upper):
     robot = two_joints(tmp_path, LIMIT, LIMIT, "prismatic")
     robot.lower[0], robot.upper[0] = lower, upper
     tip = robot.frame("d")
-    height = Along(resting([0.0] * 3, tip), [(0.0, 0.0, 1.0)])
+    height = tasks.Along(resting([0.0] * 3, tip), [(0.0, 0.0, 1.0)])
     assert solve_ik(robot, [9.0, 0.0], [height]).status is Status.SOLVED
     found = solve_ik(robot, robot.rest, [resting([0.0, 1.0, 0.0], tip)], until=1e-6)
     assert (found.met, found.starts) == (False, 20)
@@ -489,9 +464,9 @@ def test_a_base_that_floats_goes_as_far_as_it_is_asked_to(far):
 @pytest.mark.parametrize("far", [1e200, 1e308])
 def test_a_target_beyond_all_numbers_is_unreachable(far):
     hand = resting([far, far, 0.0])
-    assert solve_ik(ROBOT, Q, [hand, Posture(tuple(Q))]).status is Status.NUMERICAL_FAILURE
+    assert solve_ik(ROBOT, Q, [hand, tasks.Posture(tuple(Q))]).status is Status.NUMERICAL_FAILURE
     with np.errstate(all="ignore"):
-        found = solve_ik(ROBOT, Q, [hand, Posture(tuple(Q))], until=1e-6)
+        found = solve_ik(ROBOT, Q, [hand, tasks.Posture(tuple(Q))], until=1e-6)
     assert (found.met, "no joint moves" in found.verdict) == (False, False)
 
 

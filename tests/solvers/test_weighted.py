@@ -67,16 +67,6 @@ def test_the_top_level_is_strict_if_it_has_inequalities_or_as_many_as_asked_for(
             build("generic", True))
 
 
-def test_damping_draws_to_the_reference():
-    h = Hierarchy.from_levels([([[1.0, 1.0]], [1.0]), ([[1.0, 1.0 + 1e-3]], [2.0])], [3.0, -1.0])
-    w = np.array([100.0, 1.0])[:, None]
-    A, b, damping = w * h.A, w[:, 0] * h.lower, 0.1
-    square = damping ** 2 * (1.0 - (np.linalg.svd(A, compute_uv=False)[-1] / 0.1) ** 2)
-    step = np.linalg.solve(A.T @ A + square * np.eye(2), A.T @ (b - A @ h.reference))
-    found = make("weighted", damping=damping, threshold=0.1).solve(h)
-    np.testing.assert_allclose(found.x, h.reference + step, atol=EXACT)
-
-
 @pytest.mark.parametrize("name", backends.BACKENDS)
 def test_a_backend_that_is_not_installed_names_what_brings_it(name, monkeypatch):
     backends.installed.cache_clear()
@@ -96,19 +86,6 @@ def test_an_answer_that_cannot_be_shown_right_leaves_the_levels_above(vouched, s
         ([[1.0, 0.0]], [2.0]), (np.eye(2), [-1.0, 3.0], [1.0, 4.0])]))
     assert res.status is status
     np.testing.assert_allclose(res.x, [2.0, 0.0], rtol=0.0, atol=3.0 * make("hqp").accuracy)
-
-
-@pytest.mark.parametrize("name", [name for name in backends.BACKENDS if backends.installed(name)])
-@pytest.mark.parametrize("rows", [0, 2])
-def test_what_a_backend_answers_is_near_the_optimum_before_it_is_refined(name, rows):
-    rng = np.random.default_rng(rows)
-    A, b, sides = rng.normal(size=(4, 3)), rng.normal(size=4), np.full(rows, 50.0)
-    kept = refinement.Rows(rng.normal(size=(rows, 3)), -sides, sides)
-    y, vouched = programs.null_space_program(
-        refinement.Rows(A, b, b), refinement.Rows.none(3), kept, 0.0, None
-    ).solve(backends.backend_of(name))
-    assert vouched
-    np.testing.assert_allclose(y, np.linalg.lstsq(A, b)[0], atol=1e-5)
 
 
 def test_a_program_of_small_weights_and_wide_sides_is_not_taken_for_infeasible():
