@@ -167,4 +167,5 @@ def test_a_metric_and_a_figure_of_a_plugin_are_in_the_table_and_on_the_page(run,
     ours = Run(run.scenario, "own", "own", run)
     assert ours.metrics["strain_max"].shown_unit == "Pa"
     assert {row.name for row in table([ours])} >= {"strain_max", "speed_max"}
-    assert "own: First" in multiples("dual-arm", motions([ours]), looks([ours.label]))
+    assert "own: First" in str(
+        multiples("dual-arm", motions([ours]), looks([ours.label])))
