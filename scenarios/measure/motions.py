@@ -53,7 +53,8 @@ def motions(runs: Sequence[Run], also: Callable[[Recording], Any] = lambda one: 
     for run in runs:
         if run.recording is None or run.recording.ticks < 2:
             continue
-        kind, q = (run.scenario.name, run.recording.ticks, also(run.recording)), run.recording["q"]
+        q = run.recording["q"]
+        kind = run.scenario.name, q.shape, also(run.recording)
         for i, (other, motion) in enumerate(found):
             if kind == other and (away := float(apart(q, motion.recording["q"]).max())) <= ALIKE:
                 found[i] = kind, Motion((*motion.runs, run), max(away, motion.apart))

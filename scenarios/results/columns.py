@@ -210,14 +210,11 @@ def valued(metric: Metric, value: float) -> Metric:
 
 def rows(results: Results) -> list[Row]:
     """Return a row for each metric: median and quartiles, and how they compare with the first."""
-    found = []
-    for metric in results.shown():
-        best = results.best(metric)
-        found.append(Row(metric.label, metric.shown_unit, metric.group, metric.name, tuple(
-            Cell(_summary(results, metric, label), "best" if label in best else "",
-                 more="" if label == results.labels[0] else
-                 str(results.paired(metric.name, label))) for label in results.labels)))
-    return grouped(found)
+    return grouped([Row(metric.label, metric.shown_unit, metric.group, metric.name, tuple(
+        Cell(_summary(results, metric, label), "best" if label in best else "",
+             more="" if label == results.labels[0] else str(results.paired(metric.name, label)))
+        for label in results.labels))
+        for metric in results.shown() for best in [results.best(metric)]])
 
 
 def _summary(results: Results, metric: Metric, label: str) -> str:

@@ -2,9 +2,11 @@
 
 import warnings
 from collections.abc import Iterable, Mapping, Sequence
+from functools import partial
 from typing import Any
 
 import numpy as np
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
@@ -130,11 +132,9 @@ def multiples(name: str, found: Sequence[Motion], looks: Mapping[str, Look]) -> 
 
 def _key(figures: Iterable[Figure]) -> dict[str, str]:
     """Return the legend of a panel's joints or tasks, if colours mean the same in all runs."""
-    keys = []
-    for fig in figures:
-        drawn = {str(line.get_label()): str(line.get_color()) for line in fig.axes[0].lines}
-        keys.append({label: colour for label, colour in drawn.items()
-                     if not label.startswith("_child")})  # matplotlib's names of those without
+    keys = [{str(line.get_label()): str(line.get_color()) for line in fig.axes[0].lines
+             if not str(line.get_label()).startswith("_child")}  # matplotlib's, of those without
+            for fig in figures]
     colours = list(keys[0].values())
     clear = set(colours) <= set(drawing.JOINTS) and len(set(colours)) == len(colours)
     return keys[0] if clear and all(one == keys[0] for one in keys) else {}
@@ -145,21 +145,20 @@ def overlays(name: str, runs: Sequence[Run], found: Sequence[Motion],
     """Return overlaid curves: path error, joint difference from the first run, computing time."""
     recordings = {run.label: run.recording for run in runs
                   if run.recording is not None and run.recording.ticks > 1}
-    figs = []
+    figs = {}
     moved = {one.label: one.recording for one in found}
     if len(moved) > 1 and all("position_error" in one for one in moved.values()):
-        figs.append(("Distance from the path [mm]",
-                     _overlay(panels.position_error, moved, looks)))
+        figs["Distance from the path [mm]"] = _overlay(panels.position_error, moved, looks)
     if len({one.scenario.name for one in recordings.values()}) < len(recordings):
-        first, one = next(iter(recordings.items()))
-        figs.append((f"Joint difference from {first} [{units_of(one)}]",
-                     _departure(recordings, looks)))
+        (first, one), *others = recordings.items()
+        figs[f"Joint difference from {first} [{units_of(one)}]"] = _overlay(
+            partial(_departure, first=one), dict(others), looks)
     timings = {run.label: run.timing or recordings[run.label] for run in runs
                if run.label in recordings}
-    figs.append(("Time per tick: ● resolve, median; | whole tick, median; × whole tick, 99.9 %",
-                 _computing_time(timings, looks)))
+    figs["Time per tick: ● resolve, median; | whole tick, median; × whole tick, 99.9 %"] = (
+        _computing_time(timings, looks))
     return {"looks": {label: looks[label] for label in recordings},
-            "drawn": [(title, svg(fig, f"{name}: {title}")) for title, fig in figs]}
+            "drawn": [(title, svg(fig, f"{name}: {title}")) for title, fig in figs.items()]}
 
 
 def side_by_side(panel: Panel, recordings: Mapping[str, Recording], looks: Mapping[str, Look]
@@ -168,12 +167,12 @@ def side_by_side(panel: Panel, recordings: Mapping[str, Recording], looks: Mappi
 
     Values far beyond those of the other runs are cut, and the panel states their range.
     """
-    drawn, axes = {}, []
+    drawn = {}
     for label, recording in recordings.items():
         if panel.fits(recording):
             drawn[label], (ax,) = drawing.figure()
             panel.draw(ax, recording, looks[label].colour)
-            axes.append(ax)
+    axes = [fig.axes[0] for fig in drawn.values()]
     ranges = [ax.get_ylim() for ax in axes]
     widths = np.diff(ranges)[:, 0] if ranges else np.zeros(0)
     end = max((float(recordings[label]["t"][-1]) for label in drawn), default=0.0)
@@ -203,18 +202,11 @@ def _overlay(draw: Draw, recordings: Mapping[str, Recording], looks: Mapping[str
     return fig
 
 
-def _departure(recordings: Mapping[str, Recording], looks: Mapping[str, Look]) -> Figure:
-    """Return the largest joint difference from the first run over time, logarithmic."""
-    fig, (ax,) = drawing.figure(width=4.9, height=2.7)
-    first, *others = recordings
-    reference = recordings[first]
-    for label in others:
-        away = apart(recordings[label]["q"], reference["q"])
-        drawing.curve(ax, reference["t"][:len(away)], np.maximum(away, 1e-16),
-                      color=looks[label].colour, linestyle=looks[label].line)
+def _departure(ax: Axes, recording: Recording, colour: str, first: Recording) -> None:
+    """Draw the largest joint difference from the first run over time, logarithmic."""
+    away = apart(recording["q"], first["q"])
+    drawing.curve(ax, recording["t"][:len(away)], np.maximum(away, 1e-16), color=colour)
     drawing.make_logarithmic(ax, "y")
-    ax.set_xlabel("time [s]")
-    return fig
 
 
 def _computing_time(recordings: Mapping[str, Recording], looks: Mapping[str, Look]) -> Figure:
