@@ -310,7 +310,7 @@ def test_the_page_has_its_verdict_and_links_worst_runs_to_files_that_give_the_sa
     page = (folder / "index.html").read_text()
     assert all(line in page for line in data["groups"]["ellipse"]["verdict"])
     assert "± 0.02, uniform [rad or m]</li>" in page
-    for metric, run in found.found["ellipse"].worst()[:3]:
+    for (metric, *_), run in found.found["ellipse"].worst()[:3]:
         name = next(file for file in (folder / "worst").iterdir() if run.key[:6] in file.name)
         assert f"worst/{name.name}" in page
         assert metrics.measure(simulate(load(name)))[metric.name].value == metric.value
