@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from hierarchy.errors import file_path, refuse
 from scenarios.export import foxglove
-from scenarios.files import OutputError, finite, named, write_text, written
+from scenarios.files import OutputError, named, write_text, written
 from scenarios.recording.recording import Recording
 from scenarios.recording.signals import OTHER, known
 from scenarios.scene.drawn import scene
@@ -99,12 +99,18 @@ def _entries(recording: Recording, groups: dict[str, dict[str, NDArray[Any]]]) -
     for frame, update in foxglove.scene_updates(drawn, round(FRAMES_A_SECOND)):
         yield foxglove.nanoseconds(drawn.t[frame]), "/scene", update
     for topic, group in groups.items():
-        names = list(group)
-        rows = zip(*(finite(signal.tolist()) for signal in group.values()), strict=True)
+        names, rows = list(group), zip(*(_plain(signal) for signal in group.values()), strict=True)
         for at, row in zip(times, rows, strict=True):
             yield at, topic, dict(zip(names, row, strict=True))
     for tick, kind, action in recording.events:
         yield times[tick], "/events", foxglove.log(recording["t"][tick], f"{kind}: {action}", tick)
+
+
+def _plain(values: NDArray[Any]) -> Any:
+    """Return numbers as nested lists, with None for those that are not finite."""
+    if values.dtype.kind == "f" and not np.isfinite(values).all():
+        return np.where(np.isfinite(values), values.astype(object), np.array(None)).tolist()
+    return values.tolist()
 
 
 def _bytes(message: dict[str, Any]) -> bytes:
