@@ -11,7 +11,7 @@ import json
 import os
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager, suppress
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -80,8 +80,10 @@ class Store:
 
     def add(self, outcome: Outcome) -> None:
         """Append what came of a run, which is on the disk on return; raises FullError."""
+        metrics = [[*vars(one).values()] for one in outcome.metrics]
         with writing(self.file), self.file.open("a", encoding="ascii") as stream:
-            stream.write(json.dumps(asdict(outcome)) + "\n")
+            # a plug-in may use bools of numpy
+            stream.write(json.dumps(vars(outcome) | {"metrics": metrics}, default=bool) + "\n")
             stream.flush()
             os.fsync(stream.fileno())
 
@@ -93,7 +95,7 @@ class Store:
 
 def _read(file: Path) -> list[Outcome]:
     try:
-        return [Outcome(**of | {"metrics": tuple(Metric(**one) for one in of["metrics"])})
+        return [Outcome(**of | {"metrics": tuple(Metric(*one) for one in of["metrics"])})
                 for of in map(json.loads, _ended(file).splitlines())]
     except (OSError, ValueError, LookupError, TypeError) as error:
         raise StoreError(f"{file} cannot be read ({error}); remove it to repeat its "
