@@ -1,12 +1,12 @@
 """Which runs are the same motion, drawn once and named together, and where others diverge."""
 
-import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
+from hierarchy.problem import Array
 from scenarios.measure.runs import Run
 from scenarios.measure.safety import units_of
 from scenarios.recording.recording import Recording
@@ -49,26 +49,26 @@ def motions(runs: Sequence[Run], also: Callable[[Recording], Any] = lambda one: 
 
     Only runs of one scenario can be alike. `also` gives what they must have in common.
     """
-    found: list[Motion] = []
+    found: list[tuple[Any, Motion]] = []  # each with what its runs have in common
     for run in runs:
         if run.recording is None or run.recording.ticks < 2:
             continue
-        for i, motion in enumerate(found):
-            apart = departure(run, motion.runs[0])
-            if apart <= ALIKE and also(run.recording) == also(motion.recording):
-                found[i] = Motion((*motion.runs, run), max(apart, motion.apart))
+        q = run.recording["q"]
+        kind = run.scenario.name, q.shape, also(run.recording)
+        for i, (other, motion) in enumerate(found):
+            if kind == other and (away := float(apart(q, motion.recording["q"]).max())) <= ALIKE:
+                found[i] = kind, Motion((*motion.runs, run), max(away, motion.apart))
                 break
         else:
-            found.append(Motion((run,)))
-    return found
+            found.append((kind, Motion((run,))))
+    return [motion for _, motion in found]
 
 
-def departure(run: Run, other: Run) -> float:
-    """Return the largest difference of any joint; infinite for runs of two scenarios."""
-    q, reference = (one.recording["q"] if one.recording else np.empty(0) for one in (run, other))
-    if run.scenario.name != other.scenario.name or q.shape != reference.shape:
-        return math.inf
-    return float(np.nan_to_num(np.abs(q - reference), nan=np.inf).max(initial=0.0))
+def apart(q: Array, other: Array) -> Array:
+    """Return the largest difference of any joint in each of the ticks that both runs have, (T,)."""
+    ticks = min(len(q), len(other))
+    away = np.abs(q[:ticks] - other[:ticks]).max(axis=-1, initial=0.0)
+    return np.asarray(np.nan_to_num(away, nan=np.inf))
 
 
 @dataclass(frozen=True)
@@ -114,16 +114,14 @@ def partings(runs: Sequence[Run]) -> list[Parting]:
 
 def _parting(one: Labelled, other: Labelled) -> Parting:
     (label, mine), (first, theirs) = one, other
-    ticks, accuracy = min(mine.ticks, theirs.ticks), mine.facts.resolver.accuracy
+    accuracy, away = mine.facts.resolver.accuracy, apart(mine["q"], theirs["q"])
     bound = max(BOUND, accuracy)
-    apart = abs(mine["q"][:ticks] - theirs["q"][:ticks]).max(axis=1)
-    beyond = np.flatnonzero(~(apart <= bound))
-    largest = float(np.nan_to_num(apart, nan=np.inf).max())
-    if not beyond.size:
-        return Parting(label, first, bound, largest, units_of(mine))
-    tick = int(beyond[0])
-    return Parting(label, first, bound, largest, units_of(mine), tick, float(mine["t"][tick]),
-                   _why(one, other, tick, accuracy))
+    found = Parting(label, first, bound, float(away.max()), units_of(mine))
+    if not found.largest > bound:
+        return found
+    tick = int((away > bound).argmax())
+    return replace(found, tick=tick, time=float(mine["t"][tick]),
+                   why=_why(one, other, tick, accuracy))
 
 
 def _why(one: Labelled, other: Labelled, tick: int, accuracy: float) -> str:

@@ -106,13 +106,6 @@ _REFERENCE = {
     "HUM38": "38 unknowns: limits, four tasks, posture",
     "DEGEN7": "INEQ7 with rows repeated, negated, zero, nearly parallel",
     "DYN60": "a humanoid with torque motors: dynamics, contacts, friction (fresh: extra `sim`)"}
-_POSTURES = {
-    "singular-lwr": "KUKA LWR at and near singular postures",
-    "singular-dual-arm": "an upper body with two arms, likewise",
-    "singular-humanoid": "a humanoid on two feet, likewise",
-    "singular-panda": "Franka Panda, likewise (extra `descriptions`)",
-    "singular-romeo": "Romeo on two feet, likewise (extra `descriptions`)"}
-
 _OTHERS = {
     "of-soth": "as soth is tested: ranks, rows of upper levels, all sides",
     "of-lexls": "as LexLS is tested: equalities that add a rank each",
@@ -129,7 +122,8 @@ FAMILIES = {name: Family(
     _FEW if name in _SIMULATED else _CONSECUTIVE if group == "recorded" else COUNT)
     for group, make, named in (
         ("reference", _reference, _REFERENCE), ("recorded", recorded.recorded, recorded.SCENARIOS),
-        ("postures", made.posed, _POSTURES), ("degenerate", _generated, TEXTS),
+        ("postures", made.posed, {name: one.what for name, one in made.ROBOTS.items()}),
+        ("degenerate", _generated, TEXTS),
         ("others", _other, _OTHERS), ("others", made.of_examples, _EXAMPLES),
         ("random", _generated, {"recipe": "random sizes, ranks, ties, scales"}))
     for name, what in named.items()}

@@ -128,23 +128,27 @@ _NEAR = (-7.0, -2.0)  # decimal logarithm of the distance from a singular postur
 @final
 @dataclass(frozen=True)
 class Posed:
-    """A robot by a name that `Robot.load` knows, and the frames that its tasks move.
+    """What a family has: a robot by a name that `Robot.load` knows, and frames that tasks move.
 
     feet : frames whose pose is kept, the most important tasks. hands : frames that are moved.
     """
 
+    what: str
     model: str
     hands: tuple[str, ...]
     feet: tuple[str, ...] = ()
 
 
 ROBOTS = {
-    "singular-lwr": Posed("kuka_lwr", ("end_effector",)),
-    "singular-dual-arm": Posed("dual_arm", ("left_hand", "right_hand")),
-    "singular-humanoid": Posed("humanoid", ("right_hand", "left_hand"),
-                               ("left_foot", "right_foot")),
-    "singular-panda": Posed("example_robot_data:panda", ("panda_hand",)),
-    "singular-romeo": Posed("example_robot_data:romeo", ("r_gripper", "l_gripper"),
+    "singular-lwr": Posed("KUKA LWR at and near singular postures", "kuka_lwr", ("end_effector",)),
+    "singular-dual-arm": Posed("an upper body with two arms, likewise", "dual_arm",
+                               ("left_hand", "right_hand")),
+    "singular-humanoid": Posed("a humanoid on two feet, likewise", "humanoid",
+                               ("right_hand", "left_hand"), ("left_foot", "right_foot")),
+    "singular-panda": Posed("Franka Panda, likewise (extra `descriptions`)",
+                            "example_robot_data:panda", ("panda_hand",)),
+    "singular-romeo": Posed("Romeo on two feet, likewise (extra `descriptions`)",
+                            "example_robot_data:romeo", ("r_gripper", "l_gripper"),
                             ("l_ankle", "r_ankle"))}
 """Families by name; the last two need the extra `descriptions`."""
 

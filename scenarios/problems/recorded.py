@@ -4,8 +4,8 @@ DYN60 is recorded from `stand-push` (extra `sim`): the stored set with seed 60, 
 the stack became what they are; `hierarchy problems export DYN60 --seed 61` makes a fresh one.
 """
 
-from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
 from itertools import islice
 from pathlib import Path
 from typing import Any
@@ -147,16 +147,14 @@ def certified(h: Hierarchy, x: Array) -> Proof:
 def family(name: str) -> list[Problem]:
     """Read the problems of one reference family; raises HierarchyError if there is no file."""
     one = read(DATA / f"{name}.npz")
-    return _in_sequence(name, [Problem(h, proof) for h, proof in zip(
-        one.problems, one.answers or (), strict=True)])
+    return _in_sequence(name, zip(one.problems, one.answers or (), strict=True))
 
 
-def _in_sequence(name: str, problems: list[Problem]) -> list[Problem]:
+def _in_sequence(name: str, pairs: Iterable[tuple[Hierarchy, Proof | None]]) -> list[Problem]:
     """Return problems of a family with those before them, where they are consecutive ticks."""
-    if name not in RECORDED:
-        return problems
-    return [replace(one, before=problems[p - 1].h) if p % TOGETHER else one
-            for p, one in enumerate(problems)]
+    found, together = list(pairs), TOGETHER if name in RECORDED else 1
+    return [Problem(h, proof, found[p - 1][0] if p % together else None)
+            for p, (h, proof) in enumerate(found)]
 
 
 def fresh(name: str, seed: int, count: int) -> list[Problem]:
@@ -165,7 +163,6 @@ def fresh(name: str, seed: int, count: int) -> list[Problem]:
     Those of DYN60 are recorded from runs sampled with `seed`, which needs the extra `sim`, with the
     answers with which they were kept; of the others no answer is known.
     """
-    if name in RECORDED:
-        return _in_sequence(name, [Problem(h, certified(h, x))
-                                   for h, x in islice(ticks(seed), count)])
-    return [Problem(make_problem(name, seed + i), None) for i in range(count)]
+    return _in_sequence(name, (
+        ((h, certified(h, x)) for h, x in islice(ticks(seed), count)) if name in RECORDED else
+        ((make_problem(name, seed + i), None) for i in range(count))))

@@ -149,16 +149,17 @@ class Results:
         return [metric for metric in self.shown()
                 if np.nanmax(values := self.values[metric.name]) - np.nanmin(values) > NOTHING]
 
-    def worst(self) -> list[tuple[Metric, Job]]:
-        """Return the worst run for each metric that has a direction and is `varied`."""
-        found = []
+    def worst(self) -> list[tuple[list[Metric], Job]]:
+        """Return the runs that are the worst in metrics with a direction that are `varied`."""
+        found: dict[str, tuple[list[Metric], Job]] = {}
         for metric in self.varied():
             values = self.values[metric.name]
             if metric.lower_is_better is None:
                 continue
             i = int(np.nanargmax(values) if metric.lower_is_better else np.nanargmin(values))
-            found.append((valued(metric, values[i]), self.runs[i]))
-        return found
+            found.setdefault(self.runs[i].key, ([], self.runs[i]))[0].append(
+                valued(metric, values[i]))
+        return list(found.values())
 
     def alike(self) -> list[list[str]]:
         """Return the labels, together where no metric of any sample differs, nor how it ended."""
@@ -210,14 +211,11 @@ def valued(metric: Metric, value: float) -> Metric:
 
 def rows(results: Results) -> list[Row]:
     """Return a row for each metric: median and quartiles, and how they compare with the first."""
-    found = []
-    for metric in results.shown():
-        best = results.best(metric)
-        found.append(Row(metric.label, metric.shown_unit, metric.group, metric.name, tuple(
-            Cell(_summary(results, metric, label), "best" if label in best else "",
-                 more="" if label == results.labels[0] else
-                 str(results.paired(metric.name, label))) for label in results.labels)))
-    return grouped(found)
+    return grouped([Row(metric.label, metric.shown_unit, metric.group, metric.name, tuple(
+        Cell(_summary(results, metric, label), "best" if label in best else "",
+             more="" if label == results.labels[0] else str(results.paired(metric.name, label)))
+        for label in results.labels))
+        for metric in results.shown() for best in [results.best(metric)]])
 
 
 def _summary(results: Results, metric: Metric, label: str) -> str:

@@ -56,8 +56,8 @@ MOST = 4  # motions in one replay
 _FASTEST, _SLOWEST = 30.0, 5.0  # [Hz] of the frames kept
 
 
-def replay(name: str, found: Sequence[Motion], most_bytes: int) -> Markup:
-    """Return the section with the replay of up to MOST motions.
+def replay(name: str, found: Sequence[Motion], most_bytes: int) -> dict[str, str]:
+    """Return the replay of up to MOST motions and what is said of it, or the problem.
 
     The frame rate is lowered if the replay would exceed `most_bytes`.
     """
@@ -71,15 +71,14 @@ def replay(name: str, found: Sequence[Motion], most_bytes: int) -> Markup:
             rate = max(_SLOWEST, float(int(rate * most_bytes / len(document))))
             document = made(rate=rate)
     except HierarchyError as error:
-        return render("results/replay.html", problem=str(error), said="")
+        return {"problem": str(error), "said": ""}
     said = [f"Shown: {listed(list(recordings))}, {rate:g} frames per second."]
     said += [f"{listed(one.labels[1:])} {'moves' if len(one.runs) == 2 else 'move'} like "
              f"{one.label}." for one in shown if len(one.runs) > 1]
     if left:
         said.append(f"Not shown: {listed([label for one in left for label in one.labels])}; the "
                     f"replay here shows at most {in_words(MOST)} motions.")
-    return render("results/replay.html", name=name, document=document, problem="",
-                  said=" ".join(said))
+    return {"document": document, "said": " ".join(said), "problem": ""}
 
 
 _REPLAY_BYTES, _REPLAYS_BYTES = 3_000_000, 8_000_000  # of one replay, and of all on a page
@@ -118,14 +117,12 @@ def _group(comparison: Comparison, name: str, runs: Sequence[Run]) -> Markup:
     found, look, judged = motions(runs), looks(run.label for run in runs), verdicts(runs)
     parted = partings(runs)
     room = min(_REPLAY_BYTES, _REPLAYS_BYTES // len(comparison.groups()))
-    moved = {"replay": replay(name, found, room),
-             "panels": sections.multiples(name, found, look),
-             "overlays": sections.overlays(name, runs, found, look)} if found else {}
     return render("results/group.html", name=name, looks=look, verdict=lines(judged),
-                  goals=goal_table(judged),
+                  goals=goal_table(judged), replay=found and replay(name, found, room),
+                  panels=found and sections.multiples(name, found, look),
+                  overlays=found and sections.overlays(name, runs, found, look),
                   **_about(name, runs), **_picture(name, found, look),
-                  **{"replay": "", "panels": "", "overlays": "", **moved},
-                  numbers=sections.numbers(runs, look), stack=sections.stack(name, runs, look),
+                  numbers=sections.numbers(runs), stack=sections.stack(name, runs),
                   partings=[str(one) for one in parted],
                   bound=f"{BOUND:.0e} {parted[0].unit}" if parted else "",
                   commands=commands(comparison, runs),
@@ -150,7 +147,7 @@ def _picture(name: str, found: Sequence[Motion], look: Mapping[str, Look]) -> di
     """Return the picture of the paths with its caption; both empty without a motion."""
     moved = {one.label: one.recording for one in found}
     if not moved:
-        return {"picture": "", "caption": ""}
+        return {"picture": "", "caption_of_picture": ""}
     first = next(iter(moved.values()))
     caption = f"The robot is shown for {next(iter(moved))}."
     if "desired_position" in first:
@@ -159,4 +156,4 @@ def _picture(name: str, found: Sequence[Motion], look: Mapping[str, Look]) -> di
         caption += (" Red: obstacles, the distances of the avoidance around them, and control "
                     "points; the robot is solid at its closest approach to an obstacle.")
     fig = picture(moved, {label: look[label].colour for label in moved})
-    return {"picture": svg(fig, f"{name}: the paths taken"), "caption": caption}
+    return {"picture": svg(fig, f"{name}: the paths taken"), "caption_of_picture": caption}

@@ -54,7 +54,7 @@ def sweep(name_or_path: str | Path, out: str | Path, workers: Workers | None = N
           progress: Progress | None = None, command: str | None = None) -> Finished:
     """Make the runs of a sweep that `out` does not have yet, and write the results of all.
 
-    `out` holds `runs/` (the rows of runs, as they finish), `results.csv` (all runs with their
+    `out` holds `runs/` (what came of each, as they finish), `results.csv` (all runs with their
     sampled values), `results.json` (the statistics), `index.html`, and the scenarios of worst and
     failed runs in `worst/`. After an interruption, and after its parts, the same call continues. A
     failed run is a row with its reason.
@@ -132,8 +132,8 @@ def complete(jobs: Sequence[Job], store: Store, workers: Workers, name: str,
     ended = (pool.ended(work, missing, workers.processes) if workers.scheduler is None else
              cluster.ended(work, missing, workers.scheduler))
     for done, (job, found) in enumerate(ended, begun + 1):
-        store.add(job, found or Outcome(job.key, 0, "Killed: every process that started this run "
-                                        "died", None))
+        store.add(found or Outcome(job.key, 0, "Killed: every process that started this run died",
+                                   None))
         told(done, len(jobs))
     return len(missing)
 

@@ -75,10 +75,6 @@ def _shown(name: str, results: Results, plan: Plan, folder: Path) -> dict[str, A
     failures = results.failures()
     marked = caveats({run.label: resolver_facts(run.load()) for run in
                       {run.label: run for run in results.runs}.values()})
-    worst: dict[str, list[Metric]] = {}
-    for metric, run in results.worst():
-        worst.setdefault(run.key, []).append(metric)
-    of_key = {run.key: run for run in results.runs}
     one = next((one for one in plan.scenarios if one.name == name), None)
     each = "; ".join(f"{one.name}: {one.title}" for one in plan.scenarios
                      if one.name in results.labels)
@@ -92,8 +88,7 @@ def _shown(name: str, results: Results, plan: Plan, folder: Path) -> dict[str, A
         "spreads": [(metric, _BETTER[metric.lower_is_better],
                      svg(_spread(results, metric), f"{name}: {metric.label}"))
                     for metric in results.varied()],
-        "worst": [(metrics, of_key[key], *_again(of_key[key], folder))
-                  for key, metrics in worst.items()],
+        "worst": [(*one, *_again(one[1], folder)) for one in results.worst()],
         "numbers": rows(results), "looks": looks(results.labels),
         "heads": {label: [("quiet", ", ".join(text))] if text else []
                   for label, text in marked.items()}}

@@ -2,9 +2,11 @@
 
 import warnings
 from collections.abc import Iterable, Mapping, Sequence
+from functools import partial
+from typing import Any
 
 import numpy as np
-from markupsafe import Markup
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
@@ -16,13 +18,12 @@ from scenarios.draw.figures.drawing import ALERT, INK, svg
 from scenarios.draw.figures.palette import Look, task_colours
 from scenarios.draw.figures.panels import Draw, Panel
 from scenarios.draw.figures.timeline import tasks, timeline
-from scenarios.measure.motions import ALIKE, Motion, motions
+from scenarios.measure.motions import ALIKE, Motion, apart, motions
 from scenarios.measure.runs import Run, caveats, table
 from scenarios.measure.safety import units_of
 from scenarios.recording.blame import blamed
 from scenarios.recording.facts import resolver_facts
 from scenarios.recording.recording import Recording
-from scenarios.templates import render
 
 # The most important metrics; the others are folded away.
 _FIRST = ("position_error_median_settled", "position_error_max_settled", "cone_violation_max",
@@ -37,17 +38,16 @@ _FIRST = ("position_error_median_settled", "position_error_max_settled", "cone_v
 _USUAL = 4.0  # median widths of the ranges of values: wider ones would flatten all the others
 
 
-def numbers(runs: Sequence[Run], looks: Mapping[str, Look]) -> Markup:
-    """Return the metrics with the best of each row marked; minor ones are folded away."""
+def numbers(runs: Sequence[Run]) -> dict[str, Any]:
+    """Return the metrics with the best of each row marked, the minor ones as the rest."""
     rows = table(runs)
     first = [row for row in rows if row.name in _FIRST or (
         row.name.startswith("task_") and row.name.endswith("_rms"))]
     marked = caveats({run.label: resolver_facts(run.scenario) for run in runs})
     heads = {run.label: [(kind, text) for kind, text in (
         ("alert", _stopped(run)), ("quiet", ", ".join(marked[run.label]))) if text] for run in runs}
-    return render("results/measured.html", heads=heads, looks=looks, first=first,
-                  rest=[row for row in rows if row not in first], said=_marks(runs)
-                  ) if rows else Markup()
+    return {"heads": heads, "first": first, "rest": [row for row in rows if row not in first],
+            "said": _marks(runs)}
 
 
 def _marks(runs: Sequence[Run]) -> str:
@@ -91,8 +91,8 @@ def events(runs: Sequence[Run]) -> list[tuple[str, tuple[str, str, str, str]]]:
     return found
 
 
-def stack(name: str, runs: Sequence[Run], looks: Mapping[str, Look]) -> Markup:
-    """Return the section with the stack over time, one figure for each motion and its events."""
+def stack(name: str, runs: Sequence[Run]) -> dict[str, Any]:
+    """Return the stack over time, one figure for each motion, and the events."""
     found = motions(runs, also=lambda one: (one.events, one.fault, tuple(
         one["status"].nonzero()[0])))
     beside = [one.recording for one in found]
@@ -101,11 +101,10 @@ def stack(name: str, runs: Sequence[Run], looks: Mapping[str, Look]) -> Markup:
                        f"{name}, {one.label}: the stack over time"),
               counted(int(one.recording.switches().size), "change"))
              for one in found if colours]
-    return render("results/stack.html", looks=looks, colours=colours, drawn=bands,
-                  events=events(runs))
+    return {"colours": colours, "drawn": bands, "events": events(runs)}
 
 
-def multiples(name: str, found: Sequence[Motion], looks: Mapping[str, Look]) -> Markup:
+def multiples(name: str, found: Sequence[Motion], looks: Mapping[str, Look]) -> dict[str, Any]:
     """Return a card for each quantity, with one panel per motion on equal axes.
 
     A figure that fails is left out with a warning: it may be a user's code.
@@ -128,42 +127,38 @@ def multiples(name: str, found: Sequence[Motion], looks: Mapping[str, Look]) -> 
     said = "Over time [s], on equal axes." + (
         f" Drawn once: {'; '.join(same)} (within {ALIKE:.0e} "
         f"{units_of(found[0].recording)})." if same else "")
-    return render("results/panels.html", cards=cards, beside=min(len(found), 5), looks=looks,
-                  said=said) if cards else Markup()
+    return {"cards": cards, "beside": min(len(found), 5), "said": said}
 
 
 def _key(figures: Iterable[Figure]) -> dict[str, str]:
     """Return the legend of a panel's joints or tasks, if colours mean the same in all runs."""
-    keys = []
-    for fig in figures:
-        drawn = {str(line.get_label()): str(line.get_color()) for line in fig.axes[0].lines}
-        keys.append({label: colour for label, colour in drawn.items()
-                     if not label.startswith("_child")})  # matplotlib's names of those without
+    keys = [{str(line.get_label()): str(line.get_color()) for line in fig.axes[0].lines
+             if not str(line.get_label()).startswith("_child")}  # matplotlib's, of those without
+            for fig in figures]
     colours = list(keys[0].values())
     clear = set(colours) <= set(drawing.JOINTS) and len(set(colours)) == len(colours)
     return keys[0] if clear and all(one == keys[0] for one in keys) else {}
 
 
 def overlays(name: str, runs: Sequence[Run], found: Sequence[Motion],
-             looks: Mapping[str, Look]) -> Markup:
+             looks: Mapping[str, Look]) -> dict[str, Any]:
     """Return overlaid curves: path error, joint difference from the first run, computing time."""
     recordings = {run.label: run.recording for run in runs
                   if run.recording is not None and run.recording.ticks > 1}
-    figs = []
+    figs = {}
     moved = {one.label: one.recording for one in found}
     if len(moved) > 1 and all("position_error" in one for one in moved.values()):
-        figs.append(("Distance from the path [mm]",
-                     _overlay(panels.position_error, moved, looks)))
+        figs["Distance from the path [mm]"] = _overlay(panels.position_error, moved, looks)
     if len({one.scenario.name for one in recordings.values()}) < len(recordings):
-        first, one = next(iter(recordings.items()))
-        figs.append((f"Joint difference from {first} [{units_of(one)}]",
-                     _departure(recordings, looks)))
+        (first, one), *others = recordings.items()
+        figs[f"Joint difference from {first} [{units_of(one)}]"] = _overlay(
+            partial(_departure, first=one), dict(others), looks)
     timings = {run.label: run.timing or recordings[run.label] for run in runs
                if run.label in recordings}
-    figs.append(("Time per tick: ● resolve, median; | whole tick, median; × whole tick, 99.9 %",
-                 _computing_time(timings, looks)))
-    return render("results/overlays.html", looks={label: looks[label] for label in recordings},
-                  drawn=[(title, svg(fig, f"{name}: {title}")) for title, fig in figs])
+    figs["Time per tick: ● resolve, median; | whole tick, median; × whole tick, 99.9 %"] = (
+        _computing_time(timings, looks))
+    return {"looks": {label: looks[label] for label in recordings},
+            "drawn": [(title, svg(fig, f"{name}: {title}")) for title, fig in figs.items()]}
 
 
 def side_by_side(panel: Panel, recordings: Mapping[str, Recording], looks: Mapping[str, Look]
@@ -172,12 +167,12 @@ def side_by_side(panel: Panel, recordings: Mapping[str, Recording], looks: Mappi
 
     Values far beyond those of the other runs are cut, and the panel states their range.
     """
-    drawn, axes = {}, []
+    drawn = {}
     for label, recording in recordings.items():
         if panel.fits(recording):
             drawn[label], (ax,) = drawing.figure()
             panel.draw(ax, recording, looks[label].colour)
-            axes.append(ax)
+    axes = [fig.axes[0] for fig in drawn.values()]
     ranges = [ax.get_ylim() for ax in axes]
     widths = np.diff(ranges)[:, 0] if ranges else np.zeros(0)
     end = max((float(recordings[label]["t"][-1]) for label in drawn), default=0.0)
@@ -207,19 +202,11 @@ def _overlay(draw: Draw, recordings: Mapping[str, Recording], looks: Mapping[str
     return fig
 
 
-def _departure(recordings: Mapping[str, Recording], looks: Mapping[str, Look]) -> Figure:
-    """Return the largest joint difference from the first run over time, logarithmic."""
-    fig, (ax,) = drawing.figure(width=4.9, height=2.7)
-    first, *others = recordings
-    reference = recordings[first]
-    for label in others:
-        ticks = min(reference.ticks, recordings[label].ticks)
-        apart = np.abs(recordings[label]["q"][:ticks] - reference["q"][:ticks]).max(axis=1)
-        drawing.curve(ax, reference["t"][:ticks], np.maximum(apart, 1e-16),
-                      color=looks[label].colour, linestyle=looks[label].line)
+def _departure(ax: Axes, recording: Recording, colour: str, first: Recording) -> None:
+    """Draw the largest joint difference from the first run over time, logarithmic."""
+    away = apart(recording["q"], first["q"])
+    drawing.curve(ax, recording["t"][:len(away)], np.maximum(away, 1e-16), color=colour)
     drawing.make_logarithmic(ax, "y")
-    ax.set_xlabel("time [s]")
-    return fig
 
 
 def _computing_time(recordings: Mapping[str, Recording], looks: Mapping[str, Look]) -> Figure:

@@ -1,14 +1,15 @@
-"""The table of results: rows of scenario x resolver x sample x metric, as CSV files.
+"""Outcomes as runs end, a line of JSON each, and the table of results, as a CSV file.
 
-`compare`, `compare --starts` and `sweep` write the same columns. pandas reads them:
+That has rows of scenario x resolver x sample x metric; `compare`, `compare --starts` and `sweep`
+write the same columns. pandas reads them:
 `read_csv("results.csv").pivot_table("value", ["scenario", "resolver", "sample"], "metric")`.
 """
 
-import codecs
 import csv
 import io
+import json
 import os
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
@@ -24,9 +25,7 @@ from scenarios.results.plan import Job, Outcome
 COLUMNS = ("key", "scenario", "resolver", "sample", "metric", "value", "unit", "label", "group",
            "better", "note")
 TABLE = "results.csv"
-_SAMPLED, _RUN, _END = "Sampled", "Run", "reached_end"
 _BETTER = {True: "lower", False: "higher", None: ""}
-_LOWER = {word: lower for lower, word in _BETTER.items()}
 
 
 class StoreError(HierarchyError):
@@ -39,7 +38,7 @@ class FullError(OSError):
 
 @dataclass(frozen=True)
 class Store:
-    """The folder of a sweep: `runs/` with the rows of each writer as they come, and the results.
+    """The folder of a sweep: `runs/` with outcomes of runs as they come, and the results.
 
     part : name of this writer's file in `runs/`.
     """
@@ -50,7 +49,7 @@ class Store:
     @property
     def file(self) -> Path:
         """The file that this writer appends to."""
-        return self.folder / "runs" / f"{self.part}.csv"
+        return self.folder / "runs" / f"{self.part}.jsonl"
 
     @contextmanager
     def opened(self) -> Iterator[None]:
@@ -71,95 +70,65 @@ class Store:
         with files.named(self.folder):
             files.lock(self.file.resolve())
         try:
-            with suppress(FileNotFoundError, ValueError, csv.Error):  # what is damaged stays
-                os.truncate(self.file, len(_ended(self.file.read_bytes()).encode()))
+            with suppress(FileNotFoundError):
+                os.truncate(self.file, len(_ended(self.file)))
             yield
         finally:
             files.unlock(self.file.resolve())
             for made in (self.file.parent, self.folder):  # before any run, such as at Ctrl-C
                 files.remove_empty(made)
 
-    def add(self, job: Job, outcome: Outcome) -> None:
-        """Append the rows of a run, which are on the disk on return; raises FullError."""
-        new = not (self.file.exists() and self.file.stat().st_size)
-        text = _as_text([COLUMNS] * new + rows(job, outcome))
-        with writing(self.file), self.file.open("ab") as stream:
-            stream.write(text.encode(errors="backslashreplace"))  # paths may not be UTF-8
+    def add(self, outcome: Outcome) -> None:
+        """Append what came of a run, which is on the disk on return; raises FullError."""
+        metrics = [[*vars(one).values()] for one in outcome.metrics]
+        with writing(self.file), self.file.open("a", encoding="ascii") as stream:
+            # a plug-in may use bools of numpy
+            stream.write(json.dumps(vars(outcome) | {"metrics": metrics}, default=bool) + "\n")
             stream.flush()
             os.fsync(stream.fileno())
 
     def outcomes(self) -> dict[str, Outcome]:
         """Return all finished runs by key; raises StoreError for a damaged file."""
-        return {key: one for file in sorted((self.folder / "runs").glob("[!.]*.csv"))
-                for key, one in read(file).items()}
+        return {one.key: one for file in sorted((self.folder / "runs").glob("[!.]*.jsonl"))
+                for one in _read(file)}
+
+
+def _read(file: Path) -> list[Outcome]:
+    try:
+        return [Outcome(**of | {"metrics": tuple(Metric(*one) for one in of["metrics"])})
+                for of in map(json.loads, _ended(file).splitlines())]
+    except (OSError, ValueError, LookupError, TypeError) as error:
+        raise StoreError(f"{file} cannot be read ({error}); remove it to repeat its "
+                         "runs") from error
+
+
+def _ended(file: Path) -> bytes:
+    """Return the lines of a file that were written to their end."""
+    content = file.read_bytes()
+    return content[:content.rfind(b"\n") + 1]
 
 
 def rows(job: Job, outcome: Outcome) -> list[tuple[Any, ...]]:
     """Return the rows of a run; the last one says whether it reached its end, or why not."""
     head = job.key, job.scenario, job.resolver, job.sample
-    sampled = [(name, value, unit_at(Scenario, key.split(".")), name, _SAMPLED, "", "")
+    sampled = [(name, value, unit_at(Scenario, key.split(".")), name, "Sampled", "", "")
                for key, one in job.values.items() for name, value in leaves(one, key)]
     found = [(m.name, m.value, m.unit, m.label, m.group, _BETTER[m.lower_is_better], m.note)
              for m in outcome.metrics]
-    told = [("ticks", outcome.ticks, "", "Ticks", _RUN, "", ""),
-            ("wall_seconds", outcome.wall_seconds, "s", "Time of the run", _RUN, "", ""),
-            (_END, int(outcome.reason is None), "", "Reached the end", _RUN, "higher",
+    told = [("ticks", outcome.ticks, "", "Ticks", "Run", "", ""),
+            ("wall_seconds", outcome.wall_seconds, "s", "Time of the run", "Run", "", ""),
+            ("reached_end", int(outcome.reason is None), "", "Reached the end", "Run", "higher",
              outcome.reason or "")]
     return [(*head, *row) for row in (*sampled, *found, *told)]
 
 
 def write_table(file: Path, found: Iterable[tuple[Job, Outcome]]) -> None:
     """Write the rows of runs, whole or not at all; raises FullError."""
-    with writing(file):
-        files.write_text(file, _as_text([COLUMNS, *(row for one in found for row in rows(*one))]))
-
-
-def _as_text(lines: Iterable[Sequence[Any]]) -> str:
     text = io.StringIO()
-    csv.writer(text, lineterminator="\n").writerows(lines)
-    return text.getvalue().replace("\r", " ")  # csv does not quote it, and reads it as a line's end
-
-
-def read(file: Path) -> dict[str, Outcome]:
-    """Return the runs of a file by key, without those whose last row is missing.
-
-    Raises StoreError if it cannot be read.
-    """
-    found: dict[str, Outcome] = {}
-    metrics: dict[str, dict[str, Metric]] = {}
-    try:
-        for row in csv.DictReader(io.StringIO(_ended(file.read_bytes()), newline="")):
-            if None in row.values() or row["group"] == _SAMPLED:
-                continue
-            key, name = row["key"], row["metric"]
-            value = None if row["value"] in ("", "nan") else float(row["value"])
-            of = metrics.setdefault(key, {})
-            of[name] = Metric(name, row["label"], value, row["unit"], _LOWER[row["better"]],
-                              row["group"], row["note"])
-            if name == _END:
-                measured = tuple(one for one in of.values() if one.group != _RUN)
-                found[key] = Outcome(key, int(of["ticks"].value or 0), row["note"] or None,
-                                     of["wall_seconds"].value, measured)
-    except (OSError, ValueError, KeyError, csv.Error) as error:
-        raise StoreError(f"{file} cannot be read ({error}); remove it to repeat its "
-                         "runs") from error
-    return found
-
-
-def _ended(content: bytes) -> str:
-    """Return the text of the runs of a file that were written to their end.
-
-    What follows may end in the middle of a row, a text in quotes or a character. Raises ValueError
-    or csv.Error for what is damaged elsewhere.
-    """
-    text = codecs.getincrementaldecoder("utf-8")().decode(content)
-    lines, end = list(io.StringIO(text, newline="")), 0
-    cut = not text.endswith("\n") or text.count('"') % 2 == 1
-    reader = csv.reader(lines)
-    for row in reader:
-        whole = reader.line_num < len(lines) or not cut
-        end = reader.line_num if whole and _END in row[4:5] else end
-    return "".join(lines[:end])
+    csv.writer(text, lineterminator="\n").writerows(
+        [COLUMNS, *(row for one in found for row in rows(*one))])
+    with writing(file):  # csv does not quote a \r, and reads it as a line's end
+        files.write_text(file, text.getvalue().replace("\r", " "))
 
 
 @contextmanager

@@ -39,7 +39,7 @@ def test_runs_are_resumed_and_noise_is_small(tmp_path, monkeypatch):
     some = replace(protocol.PROTOCOL, layouts=short, seeds=(1,), starts=2,
                    columns={name: protocol.PROTOCOL.columns[name] for name in ("letter", "hqp")})
     (first,) = protocol.run(some, tmp_path, Workers(1))
-    file = tmp_path / "runs" / "all.csv"
+    file = tmp_path / "runs" / "all.jsonl"
     before = file.stat().st_size
     (second,) = protocol.run(some, tmp_path, Workers(1))
     assert (first, before) == (second, file.stat().st_size)

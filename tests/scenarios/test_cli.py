@@ -90,7 +90,8 @@ def test_an_interrupted_comparison_keeps_what_ended_and_names_the_folder(
 
     monkeypatch.setattr(comparing._Written, "add", add_and_interrupt)
     if page == "broken":
-        monkeypatch.setattr(comparing._Written, "_write", mock.Mock(side_effect=ArithmeticError))
+        monkeypatch.setattr("scenarios.results.page.comparison_page",
+                            mock.Mock(side_effect=ArithmeticError))
     said = command("compare ellipse --resolvers tpm,hcod --duration 0.02 --out b --workers",
                    workers, code=130).err
     assert "the runs made so far are in b\n" in said

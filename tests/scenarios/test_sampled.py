@@ -149,35 +149,35 @@ def test_what_has_ended_at_ctrl_c_is_given_up_unless_it_is_asked_for(monkeypatch
 
 
 def test_rows_that_were_cut_off_are_made_again_and_a_full_disk_is_said(tmp_path, monkeypatch):
-    store, jobs = Store(tmp_path / "out"), [Job(key, "", "tpm") for key in "abc"]
+    store = Store(tmp_path / "out")
     speed = metrics.Metric("speed_max", "Joint speed, max", 1.5, "rad/s", note='"v", é')
     runs = {key: Outcome(key, 20, said, 0.1, (speed,))
             for key, said in (("a", None), ("b", 'broke,\n"é" once'), ("c", None))}
     odd = Outcome("d", 20, "broke\r\nin \udcff", 0.1)
     with Store(tmp_path / "odd").opened():
-        Store(tmp_path / "odd").add(jobs[0], odd)
+        Store(tmp_path / "odd").add(odd)
     with Store(tmp_path / "odd").opened():
         pass
-    assert len(Store(tmp_path / "odd").outcomes()) == 1
+    assert Store(tmp_path / "odd").outcomes() == {"d": odd}
     with store.opened():
-        store.add(jobs[0], runs["a"])
+        store.add(runs["a"])
         one = store.file.stat().st_size
-        store.add(jobs[1], runs["b"])
+        store.add(runs["b"])
         both = store.file.read_bytes()
-    # In the header, a row, a text in quotes, a character, before the end of the last row.
-    for size in (9, *range(80, len(both), 80), both.rindex("é".encode()) + 1, len(both) - 1):
+    # In a line, in a character, before the end of the last line.
+    for size in (9, *range(80, len(both), 80), both.rindex(b"u00e9") + 1, len(both) - 1):
         store.file.write_bytes(both[:size])
         kept = {"a": runs["a"]} if size >= one else {}
         assert store.outcomes() == kept
         with store.opened():
-            store.add(jobs[2], runs["c"])
+            store.add(runs["c"])
             assert store.outcomes() == {**kept, "c": runs["c"]}
     with store.opened():
         failed = outcome(mock.Mock(key="b", load=mock.Mock(side_effect=ValueError("broke"))))
         assert (failed.key, failed.ticks, failed.reason) == ("b", 0, "ValueError: broke")
         monkeypatch.setattr(os, "fsync", mock.Mock(side_effect=OSError(28, os.strerror(28))))
-        with pytest.raises(FullError, match=r"out/runs/all\.csv cannot be written: No space"):
-            store.add(jobs[0], Outcome("d", 20, None, 0.1))
+        with pytest.raises(FullError, match=r"out/runs/all\.jsonl cannot be written: No space"):
+            store.add(Outcome("d", 20, None, 0.1))
 
 
 def test_a_folder_in_use_or_of_something_else_is_refused(tmp_path):
@@ -209,7 +209,7 @@ def test_the_page_has_its_verdict_and_links_worst_runs_to_files_that_give_the_sa
     page = (folder / "index.html").read_text()
     assert all(line in page for line in data["groups"]["ellipse"]["verdict"])
     assert "± 0.02, uniform [rad or m]</li>" in page
-    for metric, run in found.found["ellipse"].worst()[:3]:
+    for (metric, *_), run in found.found["ellipse"].worst()[:3]:
         name = next(file for file in (folder / "worst").iterdir() if run.key[:6] in file.name)
         assert f"worst/{name.name}" in page
         assert metrics.measure(simulate(load(name)))[metric.name].value == metric.value

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from hierarchy.errors import HierarchyError
+from hierarchy.problem import Array
 from scenarios.cell.build import build
 from scenarios.config import Scenario, ScenarioError
 from scenarios.config.sections.plant import KinematicSection
@@ -20,7 +21,7 @@ from scenarios.measure.verdict import verdict
 from scenarios.recording.recording import Recording
 from scenarios.scene.drawn import Scene, scene
 
-_HAND = 1.0     # [m/s] greatest speed of a dragged obstacle
+HAND = 1.0      # [m/s] greatest speed of a dragged obstacle or path
 _FARTHEST = 5.0  # [m] greatest distance of dragging
 
 
@@ -167,10 +168,13 @@ class Live:
         """Move dragged obstacles by one tick toward their targets."""
         if self.obstacles is None:
             return
-        step = _HAND * self.scenario.control.period
-        for h in np.flatnonzero((self._wanted != self.obstacles.offset).any(axis=1)).tolist():
-            here, way = self.obstacles.offset[h], self._wanted[h] - self.obstacles.offset[h]
-            length = float(np.linalg.norm(way))
-            self.obstacles.shift(h, self._wanted[h] if length <= step else
-                                 here + way * (step / length))
+        step, offset = HAND * self.scenario.control.period, self.obstacles.offset
+        for h in np.flatnonzero((self._wanted != offset).any(axis=1)).tolist():
+            self.obstacles.shift(h, toward(offset[h], self._wanted[h], step))
         self._offsets[self.recorder.ticks] = self.obstacles.offset
+
+
+def toward(here: Array, wanted: Array, most: float) -> Array:
+    """Return the place [m] that is at most `most` [m] from here on the way to where it is to go."""
+    length = float(np.linalg.norm(wanted - here))
+    return wanted if length <= most else here + (wanted - here) * (most / length)

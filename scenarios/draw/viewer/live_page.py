@@ -17,14 +17,13 @@ from scenarios.config import Scenario
 from scenarios.config.resolvers import default_resolvers
 from scenarios.draw.figures.palette import looks
 from scenarios.draw.replay import as_json, document, packed, run_data
-from scenarios.draw.viewer.live import Live
+from scenarios.draw.viewer.live import HAND, Live, toward
 from scenarios.scene.pushes import key
 from scenarios.templates import resource
 from solvers import names, variants
 
 FRAMES = 30.0   # frames per second
 _BUSY = 0.05    # [s] of ticks between two frames, at most
-_HAND = 1.0     # [m/s] greatest speed of a dragged path
 _POINTS = 300   # of a desired path
 _OFFSET = "position.offset"
 
@@ -116,7 +115,10 @@ class LivePage:
         for what, value in asked.items():
             self._do(what, value)
         if self.playing and not self.live.over:
-            self._drag_path(self.speed * seconds)
+            here = self._path_offset()
+            if (here != self._path_wanted).any():
+                self._do(_OFFSET, toward(here, self._path_wanted,
+                                         HAND * self.speed * seconds).tolist())
             self._make_ticks(seconds)
         self.now = as_json(self.data())
 
@@ -180,15 +182,6 @@ class LivePage:
                 self._follow()
         except (HierarchyError, TypeError, ValueError, IndexError, OverflowError) as error:
             self.refused, self._refusals = str(error), self._refusals + 1
-
-    def _drag_path(self, seconds: float) -> None:
-        """Move the path toward its dragged place."""
-        here = self._path_offset()
-        way = self._path_wanted - here
-        length = float(np.linalg.norm(way))
-        if length > 0.0:
-            step = min(1.0, _HAND * seconds / length)
-            self._do(_OFFSET, (here + step * way).tolist())
 
     def _path_offset(self) -> Array:
         position = self.live.scenario.position
