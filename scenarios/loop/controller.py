@@ -33,8 +33,8 @@ class Controller:
 
     hierarchy: Hierarchy
 
-    def __init__(self, cell: Cell, clock: Callable[[], float] = perf_counter) -> None:
-        self.cell, self.resolver, self.clock = cell, cell.resolver, clock
+    def __init__(self, cell: Cell, clock: Callable[[], float] | None = None) -> None:
+        self.cell, self.resolver, self.clock = cell, cell.resolver, clock or perf_counter
         control = cell.scenario.control
         self.level, self.policy = control.level, policy_of(cell, control)
         self.blend = Blend(control.transition_time) if control.transition == "blend" else None

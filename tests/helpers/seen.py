@@ -22,6 +22,7 @@ import zipfile
 from functools import cache, partial
 from importlib.metadata import version
 from pathlib import Path
+from traceback import walk_tb
 from types import SimpleNamespace
 from unittest.mock import patch
 
@@ -52,6 +53,7 @@ from scenarios.measure import run_folder, safety
 from scenarios.measure.metrics import measure
 from scenarios.measure.verdict import verdict
 from scenarios.problems.families import COUNT, FAMILIES, family
+from scenarios.recording import blame
 from scenarios.recording.facts import capsules as links
 from scenarios.recording.signals import described
 from scenarios.results import comparing, page, plan, pool, sampled, sampled_page, sections
@@ -228,6 +230,7 @@ def steadily():
                 ("perf_counter", clock, (controller, faults, depth_sensor, doctor, runs, plan)),
                 ("requires", lambda _: REQUIRED, (doctor,)), ("__file__", "csv.py", (csv,)),
                 ("version", lambda name: INSTALLED.get(name) or version("none"), (doctor,)),
+                ("walk_tb", _places, (blame,)),
                 ("sys", SimpleNamespace(version="3.11.2 (main)", version_info=(3, 11)), (doctor,)),
                 ("installed", ("osqp", "proxqp").__contains__, (backends,)),
                 ("REST", 0.004, (safety,)),  # [s]
@@ -244,6 +247,15 @@ def steadily():
             for module in modules:
                 stack.enter_context(patch.object(module, name, instead))
         yield drawn
+
+
+def _places(traceback):
+    """Frames and lines of a traceback, by the names of files; lines of the product's own are 0."""
+    for frame, line in walk_tb(traceback):
+        file = Path(frame.f_code.co_filename)
+        yield SimpleNamespace(f_code=SimpleNamespace(co_filename=file.name),
+                              f_locals=frame.f_locals, f_globals=frame.f_globals), (
+            line if "tests" in file.parts else 0)
 
 
 def seen_of_commands(group):
