@@ -16,11 +16,13 @@ from __future__ import annotations
 
 import ctypes
 import hashlib
+import json
 import os
 import pickle
 import stat
 import sys
 import tempfile
+from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from functools import cache, cached_property
@@ -178,7 +180,7 @@ class Code(NamedTuple):
     digest: str
     wrapper: str
     environment: str
-    constants: tuple[str, ...]
+    constants: Sequence[str]
 
 
 def _archive(name: str) -> ZipFile:
@@ -189,7 +191,7 @@ def write_part(name: str, index: tuple[Any, ...], **code: bytes) -> None:
     """Write a part: the fields of `Part` from `calls` to `externals`, and both kinds of code."""
     made = BytesIO()
     with ZipFile(made, "w") as archive:
-        for member, content in {"index": pickle.dumps(index), **code}.items():
+        for member, content in {"index": json.dumps(index).encode(), **code}.items():
             archive.writestr(ZipInfo(member), content)  # without the time
     write(FOLDER / f"{name}.kernels", made.getvalue())
 
@@ -211,14 +213,15 @@ class Part:
     calls: str
     functions: str
     entries: dict[str, Code]
-    externals: tuple[str, ...]
+    externals: Sequence[str]
 
     @staticmethod
     def read(name: str) -> Part | None:
         """Read a part without its code; None if its file is missing or damaged."""
         with suppress(Exception), _archive(name) as opened:  # what damage raises, or an older form
-            return Part(name, {one.filename: one.CRC for one in opened.infolist()},
-                        *pickle.loads(opened.read("index")))
+            calls, functions, entries, externals = json.loads(opened.read("index"))
+            return Part(name, {one.filename: one.CRC for one in opened.infolist()}, calls,
+                        functions, {call: Code(*one) for call, one in entries.items()}, externals)
         return None
 
     def code(self, kind: str) -> bytes:
