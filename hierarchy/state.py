@@ -220,7 +220,7 @@ class State:
 
     def centre_of_mass(self) -> Array:
         """World position (3,) [m] of the centre of mass of the bodies that joints move."""
-        self._from_now_on()
+        self._from_now_on()  # refuses a robot without masses
         R = self.placements[:, :9].reshape(-1, 3, 3)  # column by column
         points = self.placements[:, 9:] + np.einsum("jki,jk->ji", R, self.robot.centres)
         return np.asarray(self.robot.shares @ points)

@@ -121,12 +121,17 @@ def _read(file: Path) -> bytes | None:
 
 
 def write(file: Path, body: bytes) -> None:
+    """Write what `_read` returns."""
+    _replace(file, _checksum(file, body) + body)
+
+
+def _replace(file: Path, content: bytes) -> None:
     """Write a file completely or not at all; others may read it."""
     file.parent.mkdir(parents=True, exist_ok=True)
     number, name = tempfile.mkstemp(dir=file.parent)
     try:
         with os.fdopen(number, "wb") as opened:
-            opened.write(_checksum(file, body) + body)
+            opened.write(content)
         Path(name).chmod(0o644)
         Path(name).replace(file)
     except BaseException:
@@ -193,7 +198,7 @@ def write_part(name: str, index: tuple[Any, ...], **code: bytes) -> None:
     with ZipFile(made, "w") as archive:
         for member, content in {"index": json.dumps(index).encode(), **code}.items():
             archive.writestr(ZipInfo(member), content)  # without the time
-    write(FOLDER / f"{name}.kernels", made.getvalue())
+    _replace(FOLDER / f"{name}.kernels", made.getvalue())  # an archive has checksums of its own
 
 
 @final

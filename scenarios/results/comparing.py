@@ -20,7 +20,7 @@ from scenarios.measure.verdict import Comparison
 from scenarios.recording.recording import Recording
 from scenarios.results import pool
 from scenarios.results.plan import Job, Outcome, digest, key_of, side_by_side
-from scenarios.results.store import TABLE, write_table
+from scenarios.results.store import TABLE, FullError, write_table
 
 Progress = Callable[[str, int, int], None]
 
@@ -90,11 +90,15 @@ class _Written:
 
     def add(self, i: int, run: Run) -> None:
         """Take a run; write the table, and the page of two or more unless it was just written."""
-        self._runs[i], begun = run, time.monotonic()
-        paged = 1 < len(self._runs) < self._count and begun >= self._next
-        with suppress(Exception):  # `finish` says what is wrong
-            self._write(paged)
-        if paged:
+        self._runs[i] = run
+        if self._folder is None or not self._made:
+            return
+        with suppress(FullError):  # `finish` says so
+            self._write_table(self._folder)
+        if 1 < len(self._runs) < self._count and time.monotonic() >= self._next:
+            begun = time.monotonic()
+            with suppress(Exception):  # `finish` says what is wrong with it
+                self._write_page(self._folder)
             self._next = begun + (time.monotonic() - begun) / _SHARE
 
     def finish(self) -> Comparison:
@@ -106,7 +110,9 @@ class _Written:
             raise KeyboardInterrupt
         found = self._found
         try:
-            self._write()
+            if self._folder is not None:
+                self._write_table(self._folder)
+                self._write_page(self._folder)
         except Exception as error:  # of the disk, a style of matplotlib, a user's figure
             apart = "".join(f"; {run.label}: {run.error}" for run in found.runs if run.error)
             raise PageError(f"the page cannot be made: {type(error).__name__}: {error}; the "
@@ -123,19 +129,16 @@ class _Written:
         return dataclasses.replace(self._empty, runs=tuple(
             self._runs[i] for i in sorted(self._runs)))
 
-    def _write(self, paged: bool = True) -> None:
-        """Write the table and, if `paged`, the page, where there are a folder and a run."""
-        found = self._found
-        if self._folder is None or not self._made:
-            return
-        write_table(self._folder / TABLE, [(job, Outcome(
+    def _write_table(self, folder: Path) -> None:
+        write_table(folder / TABLE, [(job, Outcome(
             job.key, run.recording.ticks if run.recording else 0, run.fault, None,
-            tuple(run.metrics.values()))) for run in found.runs for job in [_job(run)]])
-        if paged:
-            from scenarios.results.page import comparison_page
+            tuple(run.metrics.values()))) for run in self._found.runs for job in [_job(run)]])
 
-            files.write_json(self._folder / "comparison.json", found.as_plain_data())
-            files.write_text(self._folder / "index.html", comparison_page(found, self._count))
+    def _write_page(self, folder: Path) -> None:
+        from scenarios.results.page import comparison_page
+
+        files.write_json(folder / "comparison.json", self._found.as_plain_data())
+        files.write_text(folder / "index.html", comparison_page(self._found, self._count))
 
 
 def _job(run: Run) -> Job:
