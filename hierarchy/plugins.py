@@ -17,6 +17,7 @@ group `task_hierarchy.tasks`, or another of `GROUPS`. A file may say with
 from __future__ import annotations
 
 import hashlib
+import re
 import sys
 from collections.abc import Callable, Iterable
 from functools import cache
@@ -32,6 +33,7 @@ if TYPE_CHECKING:
 Group = Literal["tasks", "resolvers", "robots", "plants", "sensors", "signals", "metrics",
                 "figures"]
 GROUPS: tuple[Group, ...] = get_args(Group)
+_MADE = ("tasks", "resolvers", "plants", "sensors", "metrics")  # of settings, by a call
 _PREFIX = "task_hierarchy"
 _Thing = TypeVar("_Thing")
 
@@ -45,7 +47,7 @@ def register(group: Group, name: str, *, shipped: bool = False) -> Callable[[_Th
     """Return a decorator that makes a thing available under a name.
 
     `shipped` is for what this package brings. Raises UnknownNameError for an unknown group,
-    HierarchyError if the name is no text or taken, or the thing is None.
+    HierarchyError if the name is no text or taken, or the thing is not of the group's kind.
     """
     check_name("group", group, GROUPS)
     text(f"{group}: name", name)
@@ -53,6 +55,8 @@ def register(group: Group, name: str, *, shipped: bool = False) -> Callable[[_Th
     def keep(thing: _Thing) -> _Thing:
         before = _shipped[group].get(name, _registered[group].get(name, thing))
         refuse(thing is None, f"{group}: {name!r} is None")
+        refuse(group in _MADE and not callable(thing),
+               f"{group}: {name!r} is {thing!r:.80}; register a class or a function")
         refuse(_origin(before) != _origin(thing),  # a module may be imported again
                f"{group}: {name!r} is already {_origin(before)[:80]}")
         (_shipped if shipped else _registered)[group][name] = thing
@@ -170,4 +174,5 @@ def _import(module: str, what: str) -> None:
 
 
 def _origin(thing: Any) -> str:
-    return f"{getattr(thing, '__module__', '')}.{getattr(thing, '__qualname__', repr(thing))}"
+    seen = re.sub(" at 0x[0-9a-f]+", "", repr(thing))  # of a function that it holds
+    return f"{getattr(thing, '__module__', '')}.{getattr(thing, '__qualname__', seen)}"

@@ -85,7 +85,7 @@ def described() -> str:
     """Return a line for each signal: name, shape, unit and what it is."""
     return "\n".join(f"{one.name.replace('*', 'NAME')} : {one.shape}"
                      f"{f' [{one.unit}]' if one.unit else ''} {one.text}"
-                     for one in plugins.known("signals").values())
+                     for one in plugins.known("signals").values() if isinstance(one, Signal))
 
 
 _JOINTS, _END, _DISTANCES = "/joints", "/end_effector", "/distances"

@@ -13,6 +13,7 @@ from unplugged import unplugged
 from hierarchy import Hierarchy, Robot, plugins
 from scenarios import Scenario, load, simulate
 from scenarios.config.sections.tasks import OwnTask
+from scenarios.recording.signals import described, known
 from solvers import make
 
 OWN = Path(__file__).parents[1] / "data" / "seen" / "own.toml"
@@ -107,6 +108,7 @@ def test_a_name_of_an_entry_point_is_found_without_being_imported_first(group, l
     ("register('tasks', 'elbow')(Weak)", "tasks: 'elbow' is already"),
     ("register('task', 'odd')", "unknown group 'task'; did you mean 'tasks'"),
     ("register('tasks', 'more')(None)", "tasks: 'more' is None"),
+    ("register('plants', 'three')(3)", "plants: 'three' is 3; register a class or a function"),
     ("register('tasks', Weak)", "tasks: name: expected a str, got type"),
     ("Signal('odd', 'Pa', (3,), '')", "signal 'odd': shape: expected a str, got tuple (3,)"),
     ("Signal('odd', 'Pa', '(T,)', '', '/tf')",  # broke its messages
@@ -116,6 +118,7 @@ def test_what_cannot_be_registered_is_refused_on_import(line, said, folder):
     (folder / "mine.py").write_text(f"from own_kinds import *\n{line}\n")
     refused(f"plugin 'mine' cannot be imported: {said}", plugins.allow, "mine")
     assert type(make("hcod")).__name__ == "Hcod"
-    plugins.register("plants", "three")(3)
-    refused("plant of kind 'three': TypeError: 3 is not a callable object", load, OWN)
+    plugins.register("signals", "three")(3)
+    assert "strain : (T,) [Pa] of a link" in described()
+    refused("signals: 'three': expected a Signal, got int 3; register a Signal", known, "three")
     refused("'./mine.py': give the name of a module", plugins.allow, "./mine.py")
