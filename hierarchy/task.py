@@ -274,7 +274,8 @@ def parts(task: Task) -> Iterator[Task]:
 def _of_state(method: Callable[..., Any], binds: bool) -> Callable[..., Any]:
     """Return a method of a task, for the robot of a state, that refuses anything but a State.
 
-    One that binds a kernel, which looks at no index, refuses the state of another robot.
+    One that binds a kernel, which looks at no index, refuses the state of another robot, and a
+    writer arrays of another size.
     """
     @wraps(method)
     def checked(self: Task, state: State, *rest: Any, **named: Any) -> Any:
@@ -283,6 +284,8 @@ def _of_state(method: Callable[..., Any], binds: bool) -> Callable[..., Any]:
         known = self.on(state.robot)
         if binds:
             _check_robot(known, state.robot)
+        if method.__name__ == "writer":
+            _check_rows(known, state, *rest, **named)
         return method(known, state, *rest, **named)
 
     return checked
@@ -296,6 +299,14 @@ def _check_robot(task: Task, robot: Robot) -> None:
         for part in value if isinstance(value, list | tuple) else (value,):
             if isinstance(joint := getattr(part, "joint", None), int):
                 robot.check_joint(what, joint, getattr(part, "of", ""))
+
+
+def _check_rows(task: Task, state: State, level: Level, rows: Rows) -> None:
+    contacts = task.contacts if task.of_forces else None
+    shape = task.dimension, state.n if contacts is None else contacts.unknowns
+    given = rows.A.shape, rows.lower.shape, rows.upper.shape
+    task.refuse(given != (shape, shape[:1], shape[:1]),
+                f"its rows are {shape}, and arrays of {rows.A.shape} were made; make another stack")
 
 
 def seen_by(task: Task, state: State, points: Sequence[ControlPoint]) -> Measurement:
@@ -325,8 +336,6 @@ def writer_in_stack(task: Task, state: State, level: Level, rows: Rows) -> Write
     """Return the writer of a task; at level "torque" one of the joints writes their columns."""
     check_choice(f"task {task.name!r}: kind", task.kind, get_args(Kind))
     check_gains(task, rows.lower.size)
-    task.refuse(task.dimension != rows.lower.size, f"it has {task.dimension} rows, and arrays of "
-                f"{rows.lower.size} were made; make another stack")
     if level == "torque" and not task.of_forces:
         level, rows = "acceleration", rows._replace(A=rows.A[:, :state.n])
     try:

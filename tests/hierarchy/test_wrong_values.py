@@ -37,6 +37,7 @@ from hierarchy.measured import Measured
 from hierarchy.paths import Blended, Jittered, Shifted, Still, circle, read_bvh
 from hierarchy.robot import Frame
 from hierarchy.robots import TABLES, Link, TreeFrame, TreeTable
+from hierarchy.task import Rows
 from hierarchy.tasks.joints.coupling import FollowedJoints
 from hierarchy.tasks.joints.joint_limits import StepLimits
 from hierarchy.tasks.together import TangentCone
@@ -362,7 +363,8 @@ def limits(**settings):
      "gain = [[1.0], [1.0, 2.0]], expected a number >= 0"),
     *((lambda wrong=wrong: StepLimits(slow(wrong), 0.01), f"velocity_limit[0] is {wrong:g}")
       for wrong in (-1.0, NAN)),
-    (grown, "task 'along': it has 2 rows, and arrays of 1 were made; make another"),
+    (grown, "task 'along': its rows are (2, 7), and arrays of (1, 7) were made; make another"),
+    (lambda: LIMITS.writer(STATE, "velocity", Rows.empty(7, 3)), "of (7, 3) were made; make"),
     (lambda: StepLimits(ROBOT, 0.01, 0.0), "gain [1/s] = 0: expected a number > 0"),
     (lambda: Obstacles([Obstacle("point", (0, 0, 0))]).shift(0, (NAN, 0, 0)), "shift: offset [m]"),
     *((lambda h=h: Obstacles([Obstacle("point", (0, 0, 0))]).shift(h, (0, 0, 1)),
