@@ -195,12 +195,13 @@ def added_to(folder: Path) -> Iterator[Path]:
 
 
 @contextmanager
-def named(path: str | Path) -> Iterator[None]:
-    """Turn an OSError into an OutputError that says which path cannot be written."""
+def named(path: str | Path, error: type[Exception] = OutputError, more: str = ""
+          ) -> Iterator[None]:
+    """Turn an OSError into an error that says which path cannot be written, and `more`."""
     try:
         yield
-    except OSError as error:
-        raise OutputError(f"{path} cannot be written: {reason(error)}") from error
+    except OSError as found:
+        raise error(f"{path} cannot be written: {reason(found)}{more}") from found
 
 
 def reason(error: OSError) -> str:

@@ -16,7 +16,7 @@ from hierarchy.problem import Array
 from scenarios.config import load
 from scenarios.config.sampling import drawn
 from scenarios.draw.figures.palette import looks
-from scenarios.measure.metric import Metric, shown
+from scenarios.measure.metric import Metric, finite, shown
 from scenarios.results.plan import Outcome
 from scenarios.results.sampled import Progress, Workers
 
@@ -92,8 +92,9 @@ def run(out: Path, workers: Workers, progress: Progress | None = None) -> list[P
                                 (GIVEN["seed"] + 1, GIVEN["test"]), where)
         kept = np.isfinite(scores).all(axis=2).sum(axis=1).tolist()
         test = np.median(scores, axis=1)
-        found += [Point(name, label, trials[k], _plain(training[k]), _plain(test[i]), kept[i],
-                        GIVEN["test"], units) for i, k in enumerate(best)]
+        found += [Point(name, label, trials[k], [*map(finite, training[k])],
+                        [*map(finite, test[i])], kept[i], GIVEN["test"], units)
+                  for i, k in enumerate(best)]
     return found
 
 
@@ -151,10 +152,6 @@ def spread(best: Sequence[int], first: Array, count: int) -> list[int]:
     ordered = sorted(best, key=lambda k: (first[k], k))
     at = np.linspace(0, len(ordered) - 1, min(count, len(ordered)))
     return [ordered[int(k)] for k in at]
-
-
-def _plain(values: Array) -> list[float | None]:
-    return [float(value) if np.isfinite(value) else None for value in values]
 
 
 def table(points: Sequence[Point], name: str) -> list[str]:

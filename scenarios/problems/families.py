@@ -6,7 +6,7 @@ everybody may tune on; any other seed is fresh. Resolvers give candidates for an
 `solvers.proof` decides.
 """
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from importlib.metadata import version
@@ -16,7 +16,7 @@ from typing import final
 import numpy as np
 
 from hierarchy.errors import check_name, refuse
-from hierarchy.problem import Array, Hierarchy
+from hierarchy.problem import Hierarchy
 from scenarios.config import load
 from scenarios.files import named, written
 from scenarios.measure.run_folder import version_of
@@ -150,15 +150,11 @@ def unavailable() -> dict[str, str]:
 def answer(h: Hierarchy) -> Proof:
     """Return the proof that the answer of `hcod` leads to, or else the best of all candidates'."""
     found = prove(h, [make("hcod").solve(h).x])
-    return found if found.complete else max(found, prove(h, _candidates(h)),
-                                            key=lambda one: one.judged)
-
-
-def _candidates(h: Hierarchy) -> Iterator[Array]:
-    for name in filter(installed, _BACKENDS):
-        yield make("hqp", backend=name).solve(h).x
-    if h.is_equality:
-        yield make("recursive").solve(h).x
+    if found.complete:
+        return found
+    others = [make("hqp", backend=name) for name in filter(installed, _BACKENDS)]
+    others += [make("recursive")] * h.is_equality
+    return max(found, prove(h, (one.solve(h).x for one in others)), key=lambda one: one.judged)
 
 
 def file_of(folder: Path, family: str, seed: int) -> Path:

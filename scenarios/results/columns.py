@@ -1,7 +1,6 @@
 """Results of a sweep: runs as columns, success rates, worst cases, failures."""
 
 import dataclasses
-import math
 import re
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
@@ -13,7 +12,7 @@ from numpy.typing import NDArray
 
 from hierarchy.words import listed
 from scenarios.measure import statistics
-from scenarios.measure.metric import NOTHING
+from scenarios.measure.metric import NOTHING, finite
 from scenarios.measure.metrics import Metric
 from scenarios.measure.runs import Cell, Row, by_name, grouped
 from scenarios.measure.statistics import Paired, Spread, paired, wilson
@@ -206,7 +205,7 @@ def verdict(results: Results) -> list[str]:
 
 def valued(metric: Metric, value: float) -> Metric:
     """Return a metric with a value, None for NaN."""
-    return dataclasses.replace(metric, value=float(value) if math.isfinite(value) else None)
+    return dataclasses.replace(metric, value=finite(value))
 
 
 def rows(results: Results) -> list[Row]:

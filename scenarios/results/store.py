@@ -12,6 +12,7 @@ import os
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -34,6 +35,9 @@ class StoreError(HierarchyError):
 
 class FullError(OSError):
     """A file that cannot be written, such as on a full disk; what was written before is kept."""
+
+
+writing = partial(files.named, error=FullError, more="; finished runs are kept")
 
 
 @dataclass(frozen=True)
@@ -129,13 +133,3 @@ def write_table(file: Path, found: Iterable[tuple[Job, Outcome]]) -> None:
         [COLUMNS, *(row for one in found for row in rows(*one))])
     with writing(file):  # csv does not quote a \r, and reads it as a line's end
         files.write_text(file, text.getvalue().replace("\r", " "))
-
-
-@contextmanager
-def writing(path: Path) -> Iterator[None]:
-    """Turn an OSError into a FullError that names the file."""
-    try:
-        yield
-    except OSError as error:
-        raise FullError(f"{path} cannot be written: {files.reason(error)}; finished runs are "
-                        "kept") from error

@@ -36,19 +36,16 @@ def answer(solver: str | Resolver, settings: dict[str, Any], damping: float, tol
     number("tolerance", tolerance, 0.0)
     solve = partial(_solved, resolver, tolerance, failed)
     try:
-        levels = pack(solve)
-        x = _at_once(resolver, levels, tolerance) if type(resolver) is Hcod else None
-        return solve(levels.hierarchy()) if x is None else x
+        levels: Any = pack(solve)
+        if type(resolver) is Hcod:  # without making a Hierarchy, which only says what is wrong
+            x = levels.reference.copy()
+            solved = solve_exactly(levels, x, np.zeros(3 * levels.count + 3), resolver) == SOLVED
+            held = largest_violation(levels.A, *levels.sides, x, 0, levels.always) <= tolerance
+            if solved and held:
+                return np.asarray(x)
+        return solve(levels.hierarchy())
     except ContradictionError as error:
         raise failed(None, None, str(error)) from error
-
-
-def _at_once(resolver: Hcod, levels: Any, tolerance: float) -> Array | None:
-    """Return what `_solved` does without making a Hierarchy, or None where that has more to say."""
-    x = levels.reference.copy()
-    solved = solve_exactly(levels, x, np.zeros(3 * levels.count + 3), resolver) == SOLVED
-    held = largest_violation(levels.A, *levels.sides, x, 0, levels.always) <= tolerance
-    return x if solved and held else None
 
 
 def _solved(resolver: Resolver, tolerance: float, failed: Failed, h: Hierarchy) -> Array:

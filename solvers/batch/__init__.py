@@ -22,7 +22,7 @@ from hierarchy.errors import HierarchyError, expect, whole
 from hierarchy.gate import checked_sizes, readable, shaped
 from hierarchy.problem import Array, Hierarchy
 from hierarchy.records import set_frozen
-from solvers.kernels.batch import batch_exact, batch_merged, batch_within_bounds
+from solvers.kernels.batch import EXACT, MERGED, WITHIN_BOUNDS, solve_batch
 from solvers.kernels.merged import record_size
 from solvers.resolver import Resolver, make, refuse_inequality
 from solvers.resolvers.hcod import Hcod
@@ -149,37 +149,37 @@ def solve(batch: Batch, resolver: Resolver | None = None, threads: int | None = 
     threads = cores() if threads is None else whole("threads", threads, 1)
     batch = replace(batch)  # numpy lets its holder change the shape of an array: through the gate
     _, m, n = batch.A.shape
-    kernel, settings, size, warm = _way(resolver, m, n, len(batch.sizes))
+    way, settings, size, warm = _way(resolver, m, n, len(batch.sizes))
     x, codes = batch.reference.copy(), np.zeros(len(batch), dtype=np.int64)
     record = np.zeros((len(batch), size))
     before = None if memory is None else readable("memory", memory)
     if before is not None and before.shape == record.shape and warm:
         record[:] = before
     problems = batch.A, batch.lower, batch.upper, batch.sizes
-    _in_parallel(partial(run, kernel, problems, x, codes, record, settings), batch,
+    _in_parallel(partial(run, solve_batch, way, problems, x, codes, record, settings), batch,
                  threads)
     for p in np.flatnonzero(codes < 0)[:1]:
         if isinstance(resolver, Merged):
             refuse_safety_alone(resolver, batch[int(p)])
         refuse_inequality(resolver, batch[int(p)], -int(codes[p]) - 1)
-    steps = record[:, m] if kernel is batch_merged else record[:, -3] + record[:, -2]
-    if kernel is batch_within_bounds:  # only an unknown at a bound is worth a memory
+    steps = record[:, m] if way == MERGED else record[:, -3] + record[:, -2]
+    if way == WITHIN_BOUNDS:  # only an unknown at a bound is worth a memory
         saturated = (record[:, :n] != 0.0).any(axis=1)
         record[~saturated], steps = 0.0, np.maximum(steps, 1.0)
-    kept = record if kernel is not batch_within_bounds or record.any() else None
+    kept = record if way != WITHIN_BOUNDS or record.any() else None
     return BatchResolution(x, codes, steps.astype(np.int64), kept)
 
 
 def _way(resolver: Tpm | Hcod | Merged, m: int, n: int, levels: int
-         ) -> tuple[Callable[..., int], Array, int, bool]:
-    """Return kernel and settings of a resolver, the size of a memory, and whether it is read."""
+         ) -> tuple[int, Array, int, bool]:
+    """Return the way and settings of a resolver, the size of a memory, and whether it is read."""
     if isinstance(resolver, Merged):
         names = tuple(f"level {k + 1}" for k in range(levels))
-        return batch_merged, resolver._settings_for(names), record_size(n, m), True
+        return MERGED, resolver._settings_for(names), record_size(n, m), True
     size, warm = 3 * m + 3, resolver.damping == 0.0
     if isinstance(resolver, Tpm):
-        return batch_within_bounds, resolver._settings, n + levels + size, warm
-    return batch_exact, resolver._settings, size, warm
+        return WITHIN_BOUNDS, resolver._settings, n + levels + size, warm
+    return EXACT, resolver._settings, size, warm
 
 
 def _in_parallel(call: Callable[[Indices], int], batch: Batch, threads: int) -> None:

@@ -26,6 +26,7 @@ from solvers.kernels.linalg.space import (
     assign,
     carve_rows,
     fill,
+    integers,
     matrix,
     shared,
     vector,
@@ -68,8 +69,10 @@ def solve_by_staircase(A, lower, upper, sizes, x, settings, work):
 
 @compiled
 def solve_as_one(A, lower, upper, sizes, x, settings, work):
-    """Solve like `solve_by_staircase`, but never INACCURATE."""
-    code, _ = climb(A, lower, upper, sizes, x, settings, work)
+    """Solve like `solve_by_staircase`, all levels as one, but never INACCURATE."""
+    whole, at = integers(work, 0, 1)
+    whole[0] = lower.size
+    code, _ = climb(A, lower, upper, whole, x, settings, work[at:])
     return NUMERICAL_FAILURE if code == INACCURATE else code
 
 

@@ -169,7 +169,12 @@ def _content(head: dict[str, Any], arrays: Arrays
              ) -> tuple[tuple[Hierarchy, ...], tuple[Proof, ...] | None]:
     """Return problems and answers; raises ValueError as `_unpacked`."""
     problems = tuple(_unpacked(arrays))
-    return problems, _answers(arrays, problems) if head["answers"] else None
+    if not head["answers"]:
+        return problems, None
+    counts = {"x": [h.n for h in problems], "least": [len(h.sizes) for h in problems]}
+    columns = [_parts(arrays, name, counts.get(name, [1] * len(problems))) for name in _ANSWERS]
+    return problems, tuple(Proof(x, least, *(number.item() for number in numbers))
+                           for x, least, *numbers in zip(*columns, strict=True))
 
 
 def _unpacked(arrays: Arrays) -> Iterable[Hierarchy]:
@@ -190,14 +195,6 @@ def _unpacked(arrays: Arrays) -> Iterable[Hierarchy]:
             yield Hierarchy(A.reshape(m[p], n[p]), lower, upper, sizes[p], reference)
         except HierarchyError as error:
             raise ValueError(f"problem {p}, {error}") from error
-
-
-def _answers(arrays: Arrays, problems: Sequence[Hierarchy]) -> tuple[Proof, ...]:
-    one = [1] * len(problems)
-    counts = {"x": [h.n for h in problems], "least": [len(h.sizes) for h in problems]}
-    columns = [_parts(arrays, name, counts.get(name, one)) for name in _ANSWERS]
-    return tuple(Proof(x, least, *(number.item() for number in numbers))
-                 for x, least, *numbers in zip(*columns, strict=True))
 
 
 def _parts(arrays: Arrays, name: str, counts: Sequence[int]) -> list[NDArray[Any]]:
