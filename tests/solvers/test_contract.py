@@ -128,13 +128,16 @@ def test_resolvers_whose_damping_means_something_else_say_so():
 
 @every(RESOLVERS)
 def test_entries_that_are_not_finite_give_a_status_and_a_finite_answer(resolver):
-    for bad in (np.nan, np.inf, -np.inf):
-        for entry in (lambda h: h.A[3, 2:3], lambda h: h.upper[4:5], lambda h: h.reference[1:2]):
-            h = build("generic", True)
-            entry(h)[:] = bad
-            h.lower[4] = h.upper[4]
+    """Also in a metric, and where that has lost definiteness."""
+    for metric, (of, bad) in product((None, np.eye(7)), [("metric", -1.0), *product(
+            ("A", "upper", "reference"), (np.nan, np.inf, -np.inf))]):
+        h = build("generic", True).changed(metric=metric)
+        if getattr(h, of) is not None:
+            getattr(h, of).flat[-1] = bad
+            h.lower[-1] = h.upper[-1]
             res = resolver.solve(h)
             assert (res.status, res.x.any()) == (Status.NUMERICAL_FAILURE, False)
+            assert not certify(h, np.zeros(7)).certified
 
 
 # Levels, a reference, and the x and violations that are right; x is None where it is not unique.
