@@ -26,6 +26,7 @@ from solvers.workspace import WORKSPACE
 HQP = [make("hqp", backend=name, form=form)
        for name in BACKENDS for form in ("null-space", "slack")]
 RESOLVERS = [*(make(name) for name in names() if name != "hqp"), make("tpm-published"),
+             *(make("recursive", method=name) for name in ("nakamura", "chiaverini", "selective")),
              make("sns", form="optimal"), make("reverse", form="in-order"), *HQP]
 STRICT = [r for r in RESOLVERS if r.strict]
 INEQUALITIES = [r for r in STRICT if r.handles == "inequalities"]
@@ -257,6 +258,13 @@ def test_no_memory_changes_the_answer_and_its_own_leaves_little_to_do(resolver):
     assert tried > 3
     free = build("generic", False)  # nothing of a memory is of use
     assert gap(resolver.solve(free, cold.memory).x, resolver.solve(free).x) <= 1e-12
+    h.A[-1] = np.nan  # nor does a failure say what an earlier solve left
+    for damping in (0.0, 0.1):
+        one = dataclasses.replace(resolver, damping=damping)
+        res = one.solve(h, cold.memory)
+        assert (res.status, res.x.any()) == (Status.NUMERICAL_FAILURE, False)
+        assert (type(res), res.iterations) == (type(one.solve(h)), 1)
+        assert res.active is None or 1 not in np.abs(res.active)
 
 
 @pytest.mark.parametrize("name", names())

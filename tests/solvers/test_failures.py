@@ -177,20 +177,6 @@ def test_what_may_be_rounding_is_no_direction_without_a_rank_tolerance(name, ran
     assert solve(1e-12).status is (Status.INACCURATE if judged else Status.SOLVED)
 
 
-@pytest.mark.parametrize("damping", [0.0, 0.1])
-@pytest.mark.parametrize("name", ["hcod", "merged", "tpm"])
-def test_a_failure_with_a_memory_says_nothing_of_an_earlier_solve(name, damping):
-    """`active`, `iterations` and `saturated` were those of the solve that left the memory."""
-    resolver = make(name, damping=damping)
-    h = Hierarchy.from_levels([(np.eye(2), [-1.0, -1.0], [1.0, 1.0]), ([[1.0, 0.5]], [3.0])])
-    memory = resolver.solve(h).memory
-    h.A[2, 0] = np.nan
-    alone, res = resolver.solve(h), resolver.solve(h, memory)
-    assert (res.status, *res.x) == (Status.NUMERICAL_FAILURE, 0.0, 0.0)
-    assert (type(res), res.iterations) == (type(alone), 1)
-    assert res.active is None or 1 not in np.abs(res.active)
-
-
 @pytest.mark.parametrize(("name", "kind", "seeds"), [
     ("hqp", "nested", (9420066,)),  # once a step of dust, far from everything
     ("hqp", "near_ties", (4, 11, 13)),  # more rows were taken to act than can be met at once
