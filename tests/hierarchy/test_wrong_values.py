@@ -14,7 +14,7 @@ from scene import FRAME, ROBOT, SENSOR, of_user, resting, state_at
 from standing import CONTACTS, feet, opening
 from standing import ROBOT as HUMANOID
 
-from hierarchy import Hierarchy, Robot, Stack, State, plugins, tasks
+from hierarchy import Hierarchy, HierarchyError, Robot, Stack, State, plugins, tasks
 from hierarchy.activation import Activation, activation
 from hierarchy.avoidance import (
     Barrier,
@@ -209,10 +209,8 @@ def limits(**settings):
       for name in ("a" * 5000, "a\0b", "a\ud800")),
     # values out of their range
     (lambda: Obstacle("cone", (0, 0, 0)), "unknown obstacle shape 'cone'"),
-    (lambda: Obstacle("point", (0, NAN, 0)), "obstacle: centre: expected 3 finite numbers"),
     (lambda: Repulsion(0.0, 1.0, 1.0), "maximum"),
     (lambda: SurveillanceAreas(0.2, 0.1, 0.1), "near"),
-    (lambda: Barrier(0.1, recovery=NAN), "recovery = nan"),
     (lambda: Barrier(0.1, influence=0.1), "influence = 0.1 m must be more"),
     (lambda: tasks.Separation([ControlPoint("x", np.int64(99), (0, 0, 0))], KEPT).rows(STATE),
      "points is on joint 99"),  # of another robot, past the end of its arrays
@@ -352,7 +350,6 @@ def limits(**settings):
     (lambda: Robot.load("a." * 5000), "unknown robot 'a.a."),
     (lambda: replace(TABLES["kuka_lwr"], a=(0.0,)), "'kuka_lwr': a has 1 entries, and d 7, one"),
     (lambda: replace(TABLES["kuka_lwr"], effort=(-1.0,) * 7), "effort[0] = -1: expected a number"),
-    (lambda: replace(TABLES["kuka_lwr"], mass=(NAN,) * 7), "mass: expected finite numbers, got"),
     *((lambda points=points: replace(TABLES["kuka_lwr"], control_points=points), said)
       for points, said in (("x", "control_points[0]: expected a pair, got str 'x'; give (joint, o"),
                            ([("a", [1, 2])], "control_points[0]: expected 3 finite numbers, got"))),
@@ -364,10 +361,8 @@ def limits(**settings):
          "table 't': joints[0]: expected a TreeJoint, got str 'a'"),
         (TreeTable, {"name": "t", "joints": (), "frames": (), "end_effector": "a",
                      "links": [("", 9)]}, "'t': links[0]: expected a Link, got int 9"))),
-    *((lambda wrong=wrong: replace(TABLES["quadruped"].joints[0], name="j", **wrong), said)
-      for wrong, said in (({"axis": "w"}, "joint 'j': axis = 'w': expected one of 'x', 'y', 'z'"),
-                          ({"range": (1, -1)}, "range: expected (lower, upper), got tuple (1, -1)"),
-                          ({"velocity": NAN}, "joint 'j': velocity = nan: expected a number"))),
+    (lambda: replace(TABLES["quadruped"].joints[0], axis="w"), "axis = 'w': expected one of 'x', "),
+    (lambda: replace(TABLES["quadruped"].joints[0], range=(1, -1)), "range: expected (lower, upp"),
     *((lambda ask=ask: ask(LIMITS), said) for ask, said in (
         (lambda task: task.box(None, "velocity"), "'joint limits': state: expected a State, got"),
         (lambda task: task.clamp(3, "velocity", A[0]), "'joint limits': state: expected a State"),
@@ -408,11 +403,12 @@ def test_a_wrong_value_is_refused_and_named(make, said):
     CONTACTS.contacts[0], Obstacle("point", (0, 0, 0), path=THERE), Repulsion(1.0, 1.0, 1.0),
     Shifted(THERE, (0, 0, 1)), Jittered(THERE, 0.1, 1.0, 0), Link(), TABLES["kuka_lwr"],
     TABLES["quadruped"], TABLES["quadruped"].joints[0]], ids=lambda record: type(record).__name__)
-def test_a_field_of_another_type_is_refused_by_name(record):
+def test_a_field_of_another_type_or_nan_is_refused_by_name(record):
     for field in fields(record):
         if field.init and field.name not in ("base_speed", "base_acceleration"):  # it has no base
-            said = refused("object object", replace, record, **{field.name: object()})
-            assert field.name in said.replace(" ", "_")
+            for wrong in (object(), NAN):
+                with pytest.raises(HierarchyError, match=field.name.replace("_", "[ _]")):
+                    replace(record, **{field.name: wrong})
 
 
 def test_what_would_be_said_of_a_wrong_measure_is_not_written_for_a_right_one(monkeypatch):
