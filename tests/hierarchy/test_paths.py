@@ -10,7 +10,7 @@ from refusals import refused
 
 from hierarchy import paths
 
-CIRCLE, BLENDED = PATHS[0], paths.Blended(TIMES, POINTS, blend=0.3)
+BLENDED = paths.Blended(TIMES, POINTS, blend=0.3)
 
 
 @pytest.mark.parametrize("path", [*PATHS, BLENDED], ids=lambda path: type(path).__name__)
