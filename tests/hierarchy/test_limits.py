@@ -178,26 +178,6 @@ def test_the_sides_are_as_smooth_on_a_limit_as_before_it():
     assert (abs(there - here) <= abs(dq) / T**2 + 2.0 * abs(dv) / T + 1e-8).all()
 
 
-@pytest.mark.parametrize("horizon", [0.0, 0.05])
-@pytest.mark.parametrize("push", [0.1, 1.0, 5.0, 20.0])
-@pytest.mark.parametrize("share", [1.0, 0.8])
-def test_a_joint_that_is_pushed_onto_its_limit_comes_to_rest_there(horizon, push, share):
-    """Motors that do less than asked, as under friction: a UR5 at rest got 150 N m twice in 0.1 s.
-
-    share : of the acceleration asked for. push : [rad/s^2] on top of it."""
-    T, one, q, v = 1e-3, np.ones(1), np.full(1, 0.9), np.zeros(1)
-    limits, asked = Limits(-one, one, 4.0 * one, 300.0 * one, T, horizon), []
-    for _ in range(2000):
-        _, up = limits.box(q, v, "acceleration")
-        a = share * up + push
-        q, v = q + v * T + a * T**2 / 2, v + a * T
-        asked.append(up[0])
-    assert np.ptp(asked[1500:]) < 1e-6
-    assert abs(v[0]) < 1e-9
-    assert share * asked[-1] == pytest.approx(-push)
-    assert q[0] - 1.0 < 2.0 * push * T**2
-
-
 # ---- with a horizon ------------------------------------------------------------------------------
 def test_the_side_is_a_critically_damped_approach_where_a_joint_is_slow():
     rng, H = np.random.default_rng(1), 0.05

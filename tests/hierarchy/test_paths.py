@@ -10,7 +10,7 @@ from refusals import refused
 
 from hierarchy import paths
 
-CIRCLE, BLENDED = PATHS[0], paths.Blended(TIMES, POINTS, blend=0.3)
+BLENDED = paths.Blended(TIMES, POINTS, blend=0.3)
 
 
 @pytest.mark.parametrize("path", [*PATHS, BLENDED], ids=lambda path: type(path).__name__)
@@ -20,14 +20,6 @@ def test_velocity_and_acceleration_are_the_derivatives(path):
         before, now, later = path(t - h), path(t), path(t + h)
         rates = (later[:2] - before[:2]) / (2 * h)
         np.testing.assert_allclose(rates, now[1:], atol=2e-8, rtol=1e-6)
-
-
-def test_what_is_written_into_the_array_of_a_still_point_moves_it():
-    goal, out = np.zeros(3), np.ones((3, 3))
-    move = paths.Still(goal).writer(out)
-    goal[:] = 1.0, 2.0, 3.0
-    move(0.0)
-    np.testing.assert_array_equal(out, [goal, np.zeros(3), np.zeros(3)])
 
 
 def test_blended_waypoints_do_not_stop_and_miss_corners_by_what_is_said():

@@ -16,7 +16,7 @@ from hierarchy import Stack, State, tasks
 from hierarchy.activation import Activation
 from hierarchy.avoidance import Barrier, Measurement, Pairs
 from hierarchy.kinematics import cross, rotation_vector
-from hierarchy.paths import Ellipse
+from hierarchy.paths import Ellipse, Still
 from hierarchy.robot import Frame
 
 STEP = 1e-6
@@ -161,6 +161,7 @@ def test_a_target_however_far_is_looked_at_as_a_direction():
 
 @pytest.mark.parametrize(("kind", "given", "other"), [
     (tasks.LookAt, {"target": np.array([0.3, 0.5, 0.1])}, [0.1, -0.4, 0.2]),
+    (lambda frame, goal: tasks.Position(frame, Still(goal)), {"goal": np.zeros(3)}, [1, 2, 3]),
     (tasks.Pose, {"path": PATH, "rotation": np.eye(3)}, np.diag([1.0, -1.0, -1.0])),
     (tasks.FrameLog, {"path": PATH, "rotation": np.eye(3)}, np.diag([-1.0, 1.0, -1.0])),
     (tasks.Orientation, {"rotation": np.eye(3)}, np.diag([-1.0, 1.0, -1.0])),

@@ -238,17 +238,6 @@ def test_inequalities_are_resolved_in_a_metric_and_bounds_if_it_is_diagonal(reso
         np.testing.assert_allclose(resolver.solve(h, res.memory).x, exact.x, atol=1e-6)
 
 
-@pytest.mark.parametrize("name", names())
-@pytest.mark.parametrize(("array", "wrong"), [("metric", -1.0), ("A", np.nan)])
-def test_a_metric_that_loses_definiteness_or_rows_of_nan_are_a_numerical_failure(name, array,
-                                                                                 wrong):
-    h = Hierarchy.from_levels([([[1.0, 0.3]], [1.0])], [1.0, 1.0], metric=np.eye(2))
-    getattr(h, array)[-1, 1] = wrong
-    res = make(name).solve(h)
-    assert (res.status, res.x.any()) == (Status.NUMERICAL_FAILURE, False)
-    assert not certify(h, [1.0, 0.0]).certified
-
-
 def test_in_a_metric_the_memory_of_a_plugin_stays_as_it_is():
     class Own(Resolver):
         name = "own"

@@ -99,18 +99,8 @@ def test_recorded_problems_of_a_standing_humanoid_give_the_same_bits_in_c(folder
 
 @pytest.mark.skipif(CXX is None, reason="no compiler of C++")
 def test_the_limits_of_ros2_control_are_those_of_python_also_for_a_joint_without_limits(tmp_path):
-    (tmp_path / "box.cpp").write_text("""
-#include <cstdio>
-#include "limits.hpp"
-int main() {
-  for (double far : {0.5, double(INFINITY)}) {
-    const limits::Joint joint{-far, far, 2.0, 10.0, 0.01};
-    const auto v = limits::velocities(joint, 0.3, 0.1), a = limits::accelerations(joint, 0.3, 0.1);
-    std::printf("%.17g %.17g %.17g %.17g ", v[0], v[1], a[0], a[1]);
-  }
-}""")
-    subprocess.run([CXX, "-std=c++17", "-I", ROS2, tmp_path / "box.cpp", "-o", tmp_path / "box"],
-                   check=True)
+    subprocess.run([CXX, "-std=c++17", "-I", ROS2, ROOT / "tests/data/ros2_limits.cpp", "-o",
+                    tmp_path / "box"], check=True)
     boxes = [Limits(*np.array([[-far], [far], [2.0], [10.0]]), 0.01).box(
         np.array([0.3]), np.array([0.1]), level)
         for far in (0.5, np.inf) for level in ("velocity", "acceleration")]

@@ -1,7 +1,5 @@
 """The registry, the status, the resolution; what importing costs."""
 
-import copy
-import pickle
 from dataclasses import fields
 from unittest import mock
 
@@ -15,15 +13,6 @@ from solvers import Status, make, names
 from solvers.resolvers.set_based import SetBased
 from solvers.resolvers.settled import Settled
 from solvers.workspace import WORKSPACE
-
-
-@pytest.mark.parametrize("name", [*names(), "tpm-published"])
-def test_a_resolver_that_has_solved_can_be_pickled(name):
-    resolver, h = make(name), Hierarchy.from_levels([(np.eye(3)[:2], [1.0, 2.0])])
-    found, copied = resolver.solve(h), pickle.loads(pickle.dumps(resolver))
-    assert (copied, copied.handles) == (resolver, resolver.handles)
-    np.testing.assert_array_equal(copied.solve(h).x, found.x)
-    assert repr(pickle.loads(pickle.dumps(found))) == repr(copy.copy(found)) == repr(found)
 
 
 @pytest.mark.parametrize("name", [*names(), "smooth"])
@@ -96,27 +85,6 @@ def test_settings_of_parts_are_named():
 
 
 # The work space: its content never matters.
-def levels(n, inequalities):
-    """Levels at random; the first row of all stands in the first and in the second level again."""
-    A, b = (np.random.default_rng(0).normal(size=(4, n // 3, *of)) for of in ((n,), ()))
-    A[0, 1], A[1, 0], b[0, 1], b[1, 0] = A[0, 0], A[0, 0], b[0, 0], b[0, 0]
-    return Hierarchy.from_levels([(A[k], b[k], b[k] + inequalities * (k % 2)) for k in range(4)])
-
-
-@pytest.mark.parametrize("resolver", [
-    *map(make, ("tpm", "sns", "tpm-published", "recursive", "augmented", "hcod")),
-    *(make(name, damping=0.1) for name in ("hcod", "tpm", "tpm-published"))], ids=str)
-def test_it_grows_with_the_hierarchy_and_what_was_left_in_it_does_not_matter(resolver, monkeypatch):
-    exact = resolver.handles == "inequalities" and not resolver.damping
-    for h in (levels(n, more) for n in (60, 9) for more in range(1 + exact)):
-        monkeypatch.setattr(WORKSPACE, "array", np.empty(1))
-        small = resolver.solve(h)
-        assert small.status is Status.SOLVED
-        for left in (np.nan, np.inf, 1e300):
-            monkeypatch.setattr(WORKSPACE, "array", np.full(1_000_000, left))
-            np.testing.assert_array_equal(small.x, resolver.solve(h).x)
-
-
 @pytest.mark.parametrize("left", range(-1, 6))
 def test_nor_do_integers_left_in_it_by_a_solve_that_refuted_a_sign(left, monkeypatch):
     rows = [[-2.0], [-2.0]]

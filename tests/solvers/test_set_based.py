@@ -2,6 +2,7 @@
 
 from dataclasses import replace
 from itertools import combinations
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -11,11 +12,13 @@ from scipy.optimize import minimize
 from hierarchy import Hierarchy
 from hierarchy.activation import activation
 from solvers import Status, make
+from solvers.problems import load
 from solvers.resolvers.set_based import SetBased
 from solvers.resolvers.settled import Settled
 
 SET_BASED = SetBased(inner=make("recursive"))
 INF = np.inf
+REGRESSIONS = Path(__file__).parents[1] / "data" / "regressions"
 
 
 def pseudoinverse(M):
@@ -167,14 +170,7 @@ def test_a_level_that_those_above_decide_does_not_slow_those_below():
 
 def test_inequalities_whose_pace_leaves_one_point_do_not_hide_what_a_level_below_found():
     """Of a Panda's manipulability: joints jumped by 2.8 rad/s, and the hand's level was lost."""
-    E = np.eye(7)
-    row = [[0.0, -4.333e-5, 8.746e-5, 6.435e-5, -6.844e-4, -6.939e-12, 0.0]]
-    hand = [[-0.4021, -0.0002589, -0.3574, 0.196, -0.0183, 0.08521, 0.0],
-            [0.5474, -0.0001905, 0.4865, 0.1441, 0.02648, 0.05444, 0.0],
-            [0.0, -0.6792, -0.0001903, 0.4609, 0.001248, 0.0947, 0.0]]
-    h = Hierarchy.from_levels([
-        (E, np.full(7, -2.175), np.full(7, 2.175)), (row, [0.0841], [np.inf]),
-        (row, [0.1159], [np.inf]), (hand, [1.0187, 0.6922, -0.0283])], names=["l", "a", "b", "c"])
+    h = load(REGRESSIONS / "settled" / "panda_manipulability.npz")  # limits, a, b, a hand
     resolver = replace(settled("a", "b", "c"), period=0.02, bends={"a": 0.4722, "b": 0.4722})
     A, b, _ = list(resolver.asked(h).levels())[-1]
     np.testing.assert_allclose(A @ resolver.solve(h).x, b, atol=1e-6)

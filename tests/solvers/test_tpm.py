@@ -93,27 +93,3 @@ def test_bounds_that_exclude_each_other_give_the_point_of_least_violation():
     np.testing.assert_allclose(res.x, [place, 1.0])
     assert certify(h, res.x).certified
     assert (res.saturated.tolist(), res.scaling[0]) == ([2, 1], 0.0)
-
-
-@pytest.mark.parametrize("above", [(), ((np.zeros((0, 2)), []),)], ids=["", "below no rows"])
-@pytest.mark.parametrize("name", ["tpm", "hcod", "hqp", "sns"])
-def test_bounds_are_never_damped(name, above):
-    """Else a joint that must move away from its limit would do so only in part."""
-    low, up = np.array([0.02, -1.0]), np.array([1.0, 1.0])
-    h = Hierarchy.from_levels([*above, (np.eye(2), low, up), ([[1.0, 1.0]], [0.0])])
-    x = make(name, damping=0.05, threshold=0.1).solve(h).x
-    assert ((low - 1e-7 <= x) & (x <= up + 1e-7)).all()
-
-
-@pytest.mark.parametrize("name", ["tpm", "hcod"])
-@pytest.mark.parametrize("damping", [0.0, 0.2])
-def test_a_joint_at_its_bound_is_said_to_be_there(name, damping):
-    """With damping levels below found the bound without force: half of the joints were not."""
-    for seed in range(40):
-        r = np.random.default_rng([seed, 4102])
-        up = r.uniform(0.1, 1.0, 5)
-        tasks = [(r.normal(size=(2, 5)), 2.0 * r.normal(size=2)) for _ in range(2)]
-        h = Hierarchy.from_levels([(np.eye(5), -up, up), *tasks])
-        res = make(name, damping=damping, threshold=1.0).solve(h)
-        said = getattr(res, "saturated", res.active[:5] if name == "hcod" else np.zeros(5))
-        np.testing.assert_array_equal(said, np.sign(res.x) * (np.abs(res.x) >= up - 1e-12))
