@@ -179,6 +179,18 @@ def test_the_sides_are_as_smooth_on_a_limit_as_before_it():
 
 
 # ---- with a horizon ------------------------------------------------------------------------------
+def test_a_joint_that_is_found_fast_before_its_limit_brakes_gradually():
+    """Without (d) the acceleration would move by A in a tick."""
+    rng, T, A = np.random.default_rng(3), 1e-3, 300.0
+    room, share = rng.uniform(0.01, 0.3, 500), rng.uniform(0.05, 0.7, 500)  # of A, to rest in it
+    limits = spread(np.array([[-1.0], [1.0], [20.0], [A]]), 4, 500)
+    q, v = 1.0 - room, np.sqrt(2.0 * A * share * room)
+    ride = Ride(q, v, limits, T, "acceleration", np.ones((400, 500)), 0.05)
+    steps = np.abs(np.diff(ride.v, 2, axis=0)) / T
+    assert steps.max() < 0.25 * A
+    assert ride.high.max() < 1.0
+
+
 def test_the_side_is_a_critically_damped_approach_where_a_joint_is_slow():
     rng, H = np.random.default_rng(1), 0.05
     q, v = rng.uniform(-1.0, 1.0, 2000), rng.uniform(-3.0, 3.0, 2000)
