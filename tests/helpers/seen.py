@@ -30,14 +30,15 @@ import computed
 import computed_bench
 import computed_runs
 import numpy as np
+import pinocchio as pin
 import typer.main
 from hand_made import recording
 from matplotlib.colors import to_hex
 from matplotlib.ticker import ScalarFormatter
-from pinned import FOLDER, robot_facts
 from unplugged import unplugged
 
 from hierarchy import HierarchyError, Robot, Task, jit, plugins, tasks
+from hierarchy.robots import TABLES
 from scenarios import Scenario, load, load_run, shipped, simulate
 from scenarios import export as mcap
 from scenarios.cell.plants import physics, torque
@@ -59,19 +60,24 @@ from scenarios.recording.signals import described
 from scenarios.results import comparing, page, plan, pool, sampled, sampled_page, sections
 from scenarios.scene.drawn import scene
 from solvers import certify, explain, make, names
-from solvers.problems import Recipe, bounded, generate, structured
+from solvers.problems import ANY, KINDS, Recipe, bounded, generate, structured
+from solvers.problems import FAMILIES as SHAPES
+from solvers.problems import family as shaped
 from solvers.qp import backends
 
-ROOT = FOLDER.parents[2]
+ROOT = Path(__file__).parents[2]
+DATA = ROOT / "tests" / "data"
+FILE = DATA / "pinned" / "seen.json.gz"
 COMPUTED = computed.COMPUTED | computed_runs.COMPUTED | computed_bench.COMPUTED
-ROBOTS = [*sorted((FOLDER.parent / "robots").glob("*.xml")),
+ROBOTS = [*sorted((DATA / "robots").glob("*.xml")),
           *sorted((ROOT / "examples" / "robots").iterdir())]
 GROUPS = {file.stem: file.read_text(encoding="utf-8").splitlines()
-          for file in sorted((FOLDER.parent / "seen").glob("*.txt"))}
+          for file in sorted((DATA / "seen").glob("*.txt"))}
 # By scenario: seconds that are simulated.
 RUNS = {"ellipse": 0.2, "ellipse-hqp": 0.2, "dual-arm": 0.1, "human-hqp": 0.1, "wipe": 0.05,
         "reach-torque-smooth": 0.02}
-PLAIN = ("run ellipse", "run ellipse-hqp", "run dual-arm", "keys", "problems", "commands plain",
+PLAIN = ("run ellipse", "run ellipse-hqp", "run dual-arm", "keys", "problems", "seeds",
+         "shipped robots", "commands plain",
          *(f"computed {name}" for name in COMPUTED if name != "doubts"))
 # What `hierarchy doctor` finds: names of modules of Python.
 REQUIRED = ("json>=2", "calendar>=9", "csv", "string<2", "none>=3", "wave; sys_platform=='no'",
@@ -329,6 +335,41 @@ def seen_of_robots():
             for file in ROBOTS for robot in [Robot.from_file(file)]}
 
 
+def robot_facts(robot):
+    """Limits, rest, masses, and where all that is fixed to a body is in one posture."""
+    model, data = robot.model, robot.model.createData()
+    q = pin.integrate(model, robot.rest, np.sin(1.0 + np.arange(robot.n)))
+    pin.forwardKinematics(model, data, q)
+    pin.updateFramePlacements(model, data)
+    return {
+        "lower": robot.lower, "upper": robot.upper, "velocity_limit": robot.velocity_limit,
+        "effort_limit": robot.effort_limit, "rest": robot.rest, "masses": robot.masses,
+        "inertia": np.diag(pin.crba(model, data, q)), "gravity": pin.nonLinearEffects(
+            model, data, q, np.cos(np.arange(robot.n))),
+        "frames": {frame.name: [place.translation, *place.rotation]
+                   for frame, place in zip(model.frames, data.oMf, strict=True)},
+        "control_points": {point.name: data.oMi[point.joint].act(np.asarray(point.offset))
+                           for point in robot.control_points},
+        "capsules": {one.name: [*(data.oMi[one.joint].act(np.array(end, dtype=float))
+                                  for end in (one.start, one.end)), one.radius]
+                     for one in robot.capsules},
+        "end_effector": data.oMf[model.getFrameId(robot.end_effector)].translation}
+
+
+def seen_of_seeds():
+    """Of many generated problems, by what made them: a sum each, as seeds in reports mean them."""
+    def sums(made):
+        return [condensed([*h.rows, h.sizes, h.reference])[0] for h in made]
+
+    equalities = [structured(seed, equalities_only=True) for seed in range(40)]
+    return {**{f"kind {kind}": sums(structured(seed, (kind,)) for seed in range(60))
+               for kind in KINDS},
+            **{f"family {name}": sums(shaped(name, seed) for seed in range(30)) for name in SHAPES},
+            "any kind": sums(map(structured, range(40))), "equalities": sums(equalities),
+            "bounded": sums(map(bounded, equalities, range(40))),
+            "generated": sums(generate(seed, ANY) for seed in range(100))}
+
+
 def seen_of_computed(name):
     """Of what functions of the library return."""
     found = COMPUTED[name]()
@@ -443,7 +484,8 @@ PARTS = {**{f"run {name}": partial(seen_of_run, name) for name in RUNS},
                                         avoidance=None),
          "live page of a table": partial(seen_of_live_page, "wipe"),
          "keys": seen_of_keys, "figures": seen_of_figures,
-         "problems": seen_of_problems, "robots": seen_of_robots}
+         "problems": seen_of_problems, "robots": seen_of_robots, "seeds": seen_of_seeds,
+         "shipped robots": lambda: {name: robot_facts(Robot.named(name)) for name in TABLES}}
 
 
 def seen(part):
@@ -453,4 +495,4 @@ def seen(part):
 
 if __name__ == "__main__":
     text = json.dumps({part: seen(part) for part in PARTS})
-    (FOLDER / "seen.json.gz").write_bytes(gzip.compress(text.encode(), mtime=0))
+    FILE.write_bytes(gzip.compress(text.encode(), mtime=0))
