@@ -32,7 +32,8 @@ import computed_runs
 import numpy as np
 import pinocchio as pin
 import typer.main
-from hand_made import recording
+from hand_made import asked, recording
+from headless import whole
 from matplotlib.colors import to_hex
 from matplotlib.ticker import ScalarFormatter
 from unplugged import unplugged
@@ -52,7 +53,8 @@ from scenarios.draw.viewer import live, live_page
 from scenarios.loop import controller, faults
 from scenarios.measure import run_folder, safety
 from scenarios.measure.metrics import measure
-from scenarios.measure.verdict import verdict
+from scenarios.measure.runs import Run
+from scenarios.measure.verdict import Comparison, verdict
 from scenarios.problems.families import COUNT, FAMILIES, family
 from scenarios.recording import blame
 from scenarios.recording.facts import capsules as links
@@ -310,7 +312,8 @@ def _written(file):
         return json.loads(file.read_text())
     if file.suffix not in (".html", ".csv", ".toml") or file.parent.name == "runs":
         return ""
-    return _shown_on(file.read_text())
+    text = file.read_text()
+    return _shown_on(whole(text) if file.suffix == ".html" else text)
 
 
 def _shown_on(text):
@@ -318,6 +321,18 @@ def _shown_on(text):
     data = re.search(r'<script type="application/json" id="data">(.*?)</script>', text, re.DOTALL)
     return _cleaned(re.sub(r"<(style|script|iframe)\b.*?</\1>", "", text, flags=re.DOTALL)), (
         condensed(json.loads(data[1])) if data else "")
+
+
+def seen_of_pages():
+    """Of pages of comparisons by hand: with no run, of one tick, of odd names."""
+    odd = asked(title="<script>alert(1)</script> & co", pointing=None, avoidance=None)
+    failed = Run(odd, "hqp", "hqp", None, "HierarchyError: cannot <do>")
+    runs = [Run(one, of, of, recording(one, **more)) for one, of, more in (
+        (odd, "tpm", {}), (asked(), "tpm-published", {"t": [0.0]}),
+        (asked(name="other"), "tpm", {"fault": "diverged at tick 5"}))]
+    with steadily():
+        return [_shown_on(whole(page.comparison_page(Comparison(some, "compare", {}))))
+                for some in ([failed], [runs[0], failed], runs[1:2], runs[1:])]
 
 
 def seen_of_problems():
@@ -483,7 +498,7 @@ PARTS = {**{f"run {name}": partial(seen_of_run, name) for name in RUNS},
          "live page of a cone": partial(seen_of_live_page, "ellipse", position=None,
                                         avoidance=None),
          "live page of a table": partial(seen_of_live_page, "wipe"),
-         "keys": seen_of_keys, "figures": seen_of_figures,
+         "keys": seen_of_keys, "figures": seen_of_figures, "pages": seen_of_pages,
          "problems": seen_of_problems, "robots": seen_of_robots, "seeds": seen_of_seeds,
          "shipped robots": lambda: {name: robot_facts(Robot.named(name)) for name in TABLES}}
 
