@@ -9,13 +9,10 @@ from hierarchy import Hierarchy, Stack
 from scenarios import load
 from scenarios.cell.build import build
 from scenarios.config.sections.control import ControlSection
-from scenarios.loop.controller import Controller
 from scenarios.loop.faults import Faults
 from scenarios.loop.policy import Policy
 from scenarios.loop.transition import Blend
 from solvers import make
-
-PERIOD = 0.001
 
 
 @pytest.mark.parametrize("period", [0.001, 0.1, 1.0])
@@ -27,22 +24,6 @@ def test_braking_ends_at_rest_and_never_swings_through_it(period):
         assert (after * v >= 0.0).all()
         v = after
     assert np.abs(v).max() < 1e-9
-
-
-@pytest.mark.parametrize("name", ["ellipse", "ellipse-velocity"])
-def test_without_a_measurement_the_last_state_is_carried_on_by_the_commands_sent(name):
-    """Otherwise a robot that brakes blind would brake from a speed it has no more."""
-    c = Controller(build(load(name, ["control.damping=1.0"])))
-    plant, nothing, speed = c.cell.plant, np.full(7, np.nan), 0.0
-    for k in range(400):
-        known = plant.q.copy(), plant.v.copy()
-        x = c.command(k * PERIOD, nothing if k >= 100 else plant.q, plant.v)
-        np.testing.assert_allclose(c.cell.state.q, known[0], rtol=0, atol=1e-12)
-        np.testing.assert_allclose(c.cell.state.v, known[1], rtol=0, atol=1e-12)
-        plant.act(x)
-        speed = max(speed, np.abs(plant.v).max())
-    assert speed > 0.01
-    assert np.abs(plant.v).max() < 0.06 * speed
 
 
 @pytest.mark.parametrize("resolver", ["tpm", "recursive", "hcod"])
