@@ -356,7 +356,6 @@ def doubts():
     return found
 
 
-
 def windows():
     """Which ticks of which runs become problems, and of runs that end before their window."""
     found = {}

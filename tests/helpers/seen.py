@@ -479,12 +479,10 @@ def _rounding(number):
     return max(1.1 * 10.0 ** (int(exponent or 0) - places), 1e-7) if places or exponent else 0.0
 
 
-def _run(name, resolver="", ticks=0):
-    scenario = load(name)
-    duration = ticks * scenario.control.period if ticks else RUNS[name]
-    scenario = load(name, [f"control.duration={duration:.6g}"])
+def _run(name, ticks=0):
+    duration = ticks * load(name).control.period if ticks else RUNS[name]
     with steadily():
-        return simulate(scenario.with_resolver(resolver) if resolver else scenario)
+        return simulate(load(name, [f"control.duration={duration:.6g}"]))
 
 
 OF_PACKAGES = ("panda-ellipse", "romeo", "singular-panda", "singular-romeo", "stand-g1",
