@@ -9,13 +9,12 @@ value. Its module is replaced as it is imported, in the tests and in every progr
 the checkout is not touched, so kernels come from the cache. The tests are those that run the
 changed line, by the map that --map makes with coverage (of all tests, or of those named by --tests;
 once, and again when tests have changed), or --tests. Processes that tests start count as theirs. A
-line that runs as its module is imported has the tests of its module, or SEEN if no other line of
-it runs. Of many tests those of SEEN and MOST others are taken: a case of each function first, those
-first that run few lines, FEW of which are asked before all others: four of five mutants end there.
-A mutant that survives meets REFUSALS, each of whose cases is another check, and the WHOLE files
-with the most of such tests: what a shared fixture runs counts only for the test that asked for it
-first. Prints every survivor with its line, and the share of survivors. A mutant whose tests take
-more CPU time than --limit at once counts as killed.
+line that runs as its module is imported has DEFAULTS and the tests of its module. FEW tests are
+asked before all others, a case of each function first, those first that run few lines: four of five
+mutants end there. Then come those of SEEN, which tell much in little time, MOST others, and the
+WHOLE files with the most of such tests: what a shared fixture runs counts only for the test that
+asked for it first. Prints every survivor with its line, and the share of survivors. A mutant whose
+tests take more CPU time than --limit at once counts as killed.
 
 Not mutated: compiled kernels and the numbers they read (each mutant would compile for minutes),
 `strict=` of zip (a check that does not fire where shapes have been checked), what only a type
@@ -38,7 +37,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cache, partial
 from importlib import import_module
-from importlib.util import find_spec
+from importlib.util import MAGIC_NUMBER, find_spec
 from pathlib import Path
 from types import CodeType
 from typing import Any
@@ -55,27 +54,14 @@ FILES = sorted(file for folder in SAMPLED for file in (ROOT / folder).rglob("*.p
 MAP = ROOT / "build" / "tests-of-lines"
 FEW, MOST, WHOLE = 8, 40, 6  # tests of a mutant, beside those of SEEN, and then files of tests
 SEEN = "tests/scenarios/test_seen.py"
-REFUSALS = "tests/hierarchy/test_wrong_values.py", "tests/scenarios/test_wrong_inputs.py"
+DEFAULTS = (f"{SEEN}::test_what_is_seen_is_as_it_was[computed defaults]",
+            "tests/scenarios/test_config.py", "tests/project/test_project.py::"
+            "test_records_are_frozen_and_what_they_compute_is_neither_shown_nor_compared")
 COMPILED = ("compiled", "unlocked", "internal", "inlined", "measured")
 # The folder of kernels, the integer codes that kernels read, and the LLVM code that they contain.
 OF_KERNELS = ("solvers/kernels/", "solvers/status.py", "hierarchy/jit/intrinsics.py")
 
-# Loaded by every Python that is started: takes the code of one module from a file.
-HOOK = '''
-import marshal, os
-from importlib.machinery import SourceFileLoader
-usual = SourceFileLoader.get_code
-
-def get_code(loader, name):
-    if name != os.environ.get("MUTANT_NAME"):
-        return usual(loader, name)
-    with open(os.environ["MUTANT_CODE"], "rb") as file:
-        return marshal.load(file)
-
-SourceFileLoader.get_code = get_code
-'''
-
-# The same while the map is made: notes what a test runs in another process.
+# Loaded by every Python that is started while the map is made: notes what a test runs there.
 NOTED = '''
 import atexit, os
 from coverage import Coverage
@@ -118,10 +104,6 @@ def modules() -> list[str]:
     names = [file.relative_to(ROOT).as_posix() for file in FILES]
     left_out = OF_KERNELS if find_spec("jax") else (*OF_KERNELS, "solvers/batch/on_jax.py")
     return [name for name in names if not name.startswith(left_out)]
-
-
-def name_of(module: str) -> str:
-    return module.removesuffix(".py").removesuffix("/__init__").replace("/", ".")
 
 
 def mutants(module: str) -> Iterator[Mutant]:
@@ -185,27 +167,17 @@ def change(node: ast.AST) -> str:
 
 
 class Contexts:
-    """Tells coverage which test runs."""
+    """Tells coverage which test runs; files of tests have been imported by then."""
 
     def __init__(self, coverage: Any) -> None:
         self.coverage = coverage
 
-    def within(self, context: str) -> Iterator[None]:
-        self.coverage.switch_context(context)
-        os.environ["MAP_OF"] = context
-        result = yield
-        self.coverage.switch_context("")
-        return result
+    def pytest_collection_finish(self) -> None:
+        self.coverage.start()
 
-    @pytest.hookimpl(wrapper=True)
-    def pytest_runtest_protocol(self, item: pytest.Item) -> Iterator[None]:
-        return (yield from self.within(item.nodeid))
-
-    @pytest.hookimpl(wrapper=True)
-    def pytest_make_collect_report(self, collector: pytest.Collector) -> Iterator[None]:
-        """What a file of tests runs as it is imported, all of its tests depend on."""
-        of = collector.nodeid if isinstance(collector, pytest.File) else ""
-        return (yield from self.within(of))
+    def pytest_runtest_logstart(self, nodeid: str) -> None:
+        self.coverage.switch_context(nodeid)
+        os.environ["MAP_OF"] = nodeid
 
 
 def write_map(tests: list[str]) -> None:
@@ -219,11 +191,12 @@ def write_map(tests: list[str]) -> None:
     for module in modules():  # what these run as they are imported, is of no test
         with contextlib.suppress(ImportError):
             if not module.endswith("__main__.py"):
-                import_module(name_of(module))
+                import_module(module[:-3].removesuffix("/__init__").replace("/", "."))
+    coverage.stop()
     with tempfile.TemporaryDirectory() as folder:
         Path(folder, "sitecustomize.py").write_text(NOTED)
         os.environ |= {"PYTHONPATH": os.pathsep.join((folder, str(ROOT))), "MAP": str(MAP),
-                       "MAPPED": ":".join(source), "MAP_OF": ""}
+                       "MAPPED": ":".join(source)}
         code = pytest.main(["-q", "-p", "no:cacheprovider", "-n", "0", *tests],
                            [Contexts(coverage)])
     coverage.stop()
@@ -235,13 +208,14 @@ def write_map(tests: list[str]) -> None:
 
 
 @cache
-def known() -> dict[str, dict[int, list[str]]]:
-    """Return the tests of each line of each file, as the map has them."""
+def known() -> dict[str, dict[int, set[str]]]:
+    """Return the tests of each line of each module that does not run as the module is imported."""
     from coverage import CoverageData
 
     data = CoverageData(str(MAP))
     data.read()
-    return {file: data.contexts_by_lineno(file) for file in data.measured_files()}
+    return {module: {line: {*tests} for line, tests in data.contexts_by_lineno(
+        str(ROOT / module)).items() if "" not in tests} for module in modules()}
 
 
 @cache
@@ -250,73 +224,52 @@ def footprints() -> Counter[str]:
     return Counter(test for lines in known().values() for tests in lines.values() for test in tests)
 
 
-@cache
-def lines_of(module: str) -> dict[int, tuple[str, ...]]:
-    """Return the tests of each line of a module; of line 0 those that run any line of it."""
-    lines = {line: tuple(tests) for line, tests in known().get(str(ROOT / module), {}).items()
-             if "" not in tests}  # those run as the module is imported
-    return lines | {0: tuple(sorted({test for tests in lines.values() for test in tests}))}
-
-
 def tests_of(mutant: Mutant) -> list[tuple[str, ...]]:
     """Return the tests that run the line of a mutant, and then files of them."""
-    line = (ROOT / mutant.module).read_text().splitlines()[mutant.line - 1]
-    records = ("tests/project/test_project.py::"
-               "test_records_are_frozen_and_what_they_compute_is_neither_shown_nor_compared",)
-    keys = (f"{SEEN}::test_what_is_seen_is_as_it_was[computed defaults]",
-            "tests/scenarios/test_config.py")[:1 + mutant.module.startswith("scenarios/config/")]
-    if "frozen=" in line:
-        return [(*records, keys[0])]
-    lines = lines_of(mutant.module)
-    if not lines[0]:
-        return [(SEEN,)]
-    default = not lines.get(mutant.line)
+    lines = known()[mutant.module]
+    default = mutant.line not in lines
+    every = set().union(*lines.values()) if default else lines[mutant.line]
     seen, order = Counter[str](), dict[str, tuple[int, int]]()
-    for test in sorted(lines.get(mutant.line) or lines[0]):
+    for test in sorted(every):
         function = test.partition("[")[0]
         order[test] = seen[function], footprints()[test]
         seen[function] += 1
-    first = [test for test in order if test.startswith(SEEN)]  # much in little time
+    first = [test for test in order if test.startswith(SEEN)]
     others = sorted(order.keys() - {*first}, key=order.__getitem__)[:MOST]
     files = Counter(test.partition("::")[0] for test in order.keys() - {*first})
-    whole = [file for file in REFUSALS if file in files] + [
-        file for file, _ in files.most_common(WHOLE) if file not in REFUSALS]
-    groups = (tuple(others[:FEW]),
-              ("field(" in line) * records + default * keys + (*first, *others[FEW:]),
-              *((file,) for file in whole))
+    groups = (tuple(others[:FEW]), (*(DEFAULTS if default else ()), *first, *others[FEW:]),
+              *((file,) for file, _ in files.most_common(WHOLE)))
     return [group for group in groups if group]
 
 
-@dataclass(frozen=True)
-class Runner:
-    """Runs tests in a process of their own, with one module replaced in all that they start."""
+def passes(folder: Path, limit: int, tests: tuple[str, ...]) -> bool:
+    """Whether tests pass in a process with the byte code of a folder, in this CPU time [s]."""
+    with (folder / "output").open("w") as output, subprocess.Popen(
+            [sys.executable, "-m", "pytest", "-qx", "-n0", "-pno:cacheprovider", *tests],
+            cwd=ROOT, stdout=output, stderr=output, start_new_session=True,
+            preexec_fn=partial(resource.setrlimit, resource.RLIMIT_CPU, (limit,) * 2),
+            env={**os.environ, "PYTHONPATH": str(ROOT), "PYTHONPYCACHEPREFIX": str(folder)},
+    ) as process:
+        with contextlib.suppress(subprocess.TimeoutExpired):
+            process.wait(2.0 * limit)  # one that waits for ever
+        with contextlib.suppress(ProcessLookupError):
+            os.killpg(process.pid, signal.SIGKILL)
+    if "\nERROR: not found: " in (folder / "output").read_text():
+        sys.exit("tests of the map are gone or have other names: python tests/mutate.py --map")
+    return process.returncode in (0, 5)  # 5: nothing was to be run
 
-    folder: Path
-    limit: int  # CPU time [s]
 
-    def passes(self, tests: tuple[str, ...], **environment: str) -> bool:
-        """Whether tests pass with this environment, in time."""
-        path = os.pathsep.join((str(self.folder), str(ROOT)))
-        with (self.folder / "output").open("w") as output, subprocess.Popen(
-                [sys.executable, "-m", "pytest", "-qx", "-n0", "-pno:cacheprovider", *tests],
-                cwd=ROOT, stdout=output, stderr=output, start_new_session=True,
-                preexec_fn=partial(resource.setrlimit, resource.RLIMIT_CPU, (self.limit,) * 2),
-                env={**os.environ, "PYTHONPATH": path, **environment},
-        ) as process:
-            with contextlib.suppress(subprocess.TimeoutExpired):
-                process.wait(2.0 * self.limit)  # one that waits for ever
-            with contextlib.suppress(ProcessLookupError):
-                os.killpg(process.pid, signal.SIGKILL)
-        if "\nERROR: not found: " in (self.folder / "output").read_text():
-            sys.exit("tests of the map are gone or have other names: python tests/mutate.py --map")
-        return process.returncode in (0, 5)  # 5: nothing was to be run
-
-    def survives(self, module: str, code: CodeType, tests: tuple[str, ...]) -> bool:
-        """Whether the tests pass with this code of a module."""
-        (self.folder / "sitecustomize.py").write_text(HOOK)
-        (self.folder / "mutant").write_bytes(marshal.dumps(code))
-        return self.passes(tests, MUTANT_NAME=name_of(module),
-                           MUTANT_CODE=str(self.folder / "mutant"))
+def survives(folder: Path, limit: int, mutant: Mutant, code: CodeType,
+             groups: list[tuple[str, ...]]) -> bool:
+    """Whether all tests pass with this byte code of the module of a mutant."""
+    file = Path(f"{folder}{ROOT / mutant.module}").with_suffix(
+        f".{sys.implementation.cache_tag}.pyc")
+    file.parent.mkdir(parents=True, exist_ok=True)
+    unchecked = (1).to_bytes(4, "little") + bytes(8)  # the source may be another one
+    file.write_bytes(MAGIC_NUMBER + unchecked + marshal.dumps(code))
+    survived = all(passes(folder, limit, tests) for tests in groups)
+    file.unlink()
+    return survived
 
 
 def main() -> None:
@@ -338,23 +291,23 @@ def main() -> None:
     every = [mutant for module in options.modules or modules() for mutant in mutants(module)]
     sample = random.Random(options.seed).sample(every, min(options.count, len(every)))
     with tempfile.TemporaryDirectory() as folder:
-        alive = _try(sample, options.tests, Runner(Path(folder), options.limit))
+        alive = _try(sample, options.tests, Path(folder), options.limit)
     print(f"{alive} of {len(sample)} mutants survived: {alive / len(sample):.0%} "
           f"(of {len(every)} possible, seed {options.seed})")
 
 
-def _try(sample: list[Mutant], tests: list[str] | None, runner: Runner) -> int:
+def _try(sample: list[Mutant], tests: list[str] | None, folder: Path, limit: int) -> int:
     """Return how many mutants survive, and print them."""
-    first = tuple(tests or tests_of(sample[0])[0])
-    if not runner.passes(first):
-        sys.exit(f"{(runner.folder / 'output').read_text()}\n{first} fails without any change")
-    if runner.survives(sample[0].module, compile("raise ImportError", "", "exec"), first):
+    groups = [[tuple(tests)] if tests else tests_of(mutant) for mutant in sample]
+    first = groups[0][0]
+    if not passes(folder, limit, first):
+        sys.exit(f"{(folder / 'output').read_text()}\n{first} fails without any change")
+    if survives(folder, limit, sample[0], compile("raise ImportError", "", "exec"), [first]):
         sys.exit("the tests pass without the module")
     alive = 0
-    for done, mutant in enumerate(sample, 1):
+    for done, (mutant, asked) in enumerate(zip(sample, groups, strict=True), 1):
         described, code = mutant.code()
-        survived = all(runner.survives(mutant.module, code, some)
-                       for some in ([tuple(tests)] if tests else tests_of(mutant)))
+        survived = survives(folder, limit, mutant, code, asked)
         alive += survived
         if survived:
             print(f"survived: {done}: {mutant.module}:{mutant.line}: {described}", flush=True)

@@ -7,12 +7,12 @@ import inspect
 import itertools
 import pkgutil
 import re
+from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
 from hand_made import recording
 from mechanisms import four_bar
-from pinned import FOLDER
 from rank_cases import CASES, boxed, build
 from scene import FRAME, PATH, ROBOT, SENSOR, TASKS, state_at, states
 from standing import CONTACTS, moving_state, opening, standing_stack, written
@@ -44,6 +44,7 @@ from solvers.resolvers.set_based import SetBased
 from solvers.resolvers.settled import Settled
 from solvers.resolvers.weighted import lexicographic_weights
 
+ROBOTS = Path(__file__).parents[1] / "data" / "robots"
 BARRED = {f"{count} barred": tasks.Separation(SENSOR.points, Barrier(0.05), count)
           for count in (None, 3)}
 TIMES, POINTS = (0.5, 1.2, 2.0, 3.5), ((0.0, 0.0, 0.1), (0.3, 0.1, 0.2), (0.3, 0.5, 0.0),
@@ -339,7 +340,7 @@ def odd():
     for k, (q, v) in enumerate(states(9)):
         state = state_at(q, v)
         found[f"cone {k}"] = [cone.reference_velocity(state), cone.jacobian(state)]
-    (q, v), ball = states(1)[0], Robot.load(FOLDER.parent / "robots" / "odd.xml")
+    (q, v), ball = states(1)[0], Robot.load(ROBOTS / "odd.xml")
     lagging, alone = state_at(q, v, differences=1e-3), make("tpm")
     wrong = PublishedAvoidance(ROBOT.control_points, 1)
     steps = StepLimits(ROBOT, 0.1)

@@ -203,7 +203,11 @@ def sampled():
              *(np.r_[np.full(99, 8.0), beyond] for beyond in (20.0, 25.0)),  # twice as large these
              np.full(9, -8.0), np.zeros(9)]
     unasked = {"control.options.rank_tolerance": Distribution(uniform=(1e-9, 2e-9))}
+    moved = [load("human", [f"avoidance.variation={{seed={seed}, spread=0.1, timing=0.9}}"])
+             for seed in range(3)]
     return {"drawn": [str(drawn(load("ellipse"), unasked, 0, 0))],
+            "moved": [[one.path.times, one.path.points] for scenario in moved
+                      for one in scenario.avoidance.placed],
             "verdicts": ["\n".join([*verdict(one), str(one.paired("speed_max", "b"))])
                          for one in runs], "kept": [str(one.shares()) for one in kept],
             "beyond": [text.get_text() for text in sampled_page._spread(
@@ -350,7 +354,6 @@ def doubts():
         controller.command(0.0, cell.plant.q, cell.plant.v)
         found.append(["\n".join(footing(controller))])
     return found
-
 
 
 def windows():

@@ -2,6 +2,7 @@
 
 import base64
 import json
+import re
 import shutil
 import subprocess
 import tempfile
@@ -21,23 +22,28 @@ _PATIENCE = 180.0  # [s], which only a browser that hangs takes, on a loaded mac
 
 
 class Balanced(HTMLParser):
-    """Fails unless the elements of a text are closed in order; its texts are the `cells`."""
+    """Fails unless the elements of a text are closed in order."""
 
     def __init__(self, text):
         super().__init__()
-        self.open, self.cells = [], []
+        self.open = []
         self.feed(text)
         assert self.open == []
 
     def handle_starttag(self, tag, attributes):
-        if tag not in ("meta", "br"):
+        if tag not in ("meta", "br", "input"):
             self.open.append(tag)
 
     def handle_endtag(self, tag):
         assert self.open.pop() == tag
 
-    def handle_data(self, text):
-        self.cells.append(text)
+
+def whole(text):
+    """The text of a page whose elements are closed in order, and which needs nothing else."""
+    Balanced(text)
+    assert not re.search(r"""(?:src|href)=["']?(?:https?:)?//|@import|url\((?!#)|fetch\(|XMLHttp|"""
+                         r"<(?:link|img|(?:iframe|script)[^>]* src)\b|\bimport\(", text)
+    return text
 
 
 class Page:
@@ -55,18 +61,12 @@ class Page:
             if message.get("id") == self._number:
                 assert "error" not in message, message
                 return message["result"]
-            self._listen(message)
-
-    def _listen(self, message):
-        kind, data = message.get("method"), message.get("params", {})
-        if kind == "Runtime.exceptionThrown":
-            details = data["exceptionDetails"]
-            self.complaints.append(details.get("exception", {}).get("description", str(details)))
-        elif kind == "Runtime.consoleAPICalled" and data["type"] in ("error", "warning", "assert"):
-            self.complaints.append(str([arg.get("value") for arg in data["args"]]))
-        elif kind == "Log.entryAdded" and data["entry"]["level"] in ("error", "warning") and (
-                "GPU stall due to ReadPixels" not in data["entry"]["text"]):  # of screenshots
-            self.complaints.append(data["entry"]["text"])
+            said = message.get("params", {})
+            said = said.get("entry", said)
+            if (message.get("method") == "Runtime.exceptionThrown" or said.get(
+                    "level", said.get("type")) in ("error", "warning", "assert")) and (
+                    "GPU stall due to ReadPixels" not in str(said)):  # of screenshots
+                self.complaints.append(str(said))
 
     def look_at(self, address, width=1400, height=900, dark=False):
         """Open an address in a window of this size."""

@@ -30,14 +30,16 @@ import computed
 import computed_bench
 import computed_runs
 import numpy as np
+import pinocchio as pin
 import typer.main
-from hand_made import recording
+from hand_made import asked, recording
+from headless import whole
 from matplotlib.colors import to_hex
 from matplotlib.ticker import ScalarFormatter
-from pinned import FOLDER, robot_facts
 from unplugged import unplugged
 
 from hierarchy import HierarchyError, Robot, Task, jit, plugins, tasks
+from hierarchy.robots import TABLES
 from scenarios import Scenario, load, load_run, shipped, simulate
 from scenarios import export as mcap
 from scenarios.cell.plants import physics, torque
@@ -51,7 +53,8 @@ from scenarios.draw.viewer import live, live_page
 from scenarios.loop import controller, faults
 from scenarios.measure import run_folder, safety
 from scenarios.measure.metrics import measure
-from scenarios.measure.verdict import verdict
+from scenarios.measure.runs import Run
+from scenarios.measure.verdict import Comparison, verdict
 from scenarios.problems.families import COUNT, FAMILIES, family
 from scenarios.recording import blame
 from scenarios.recording.facts import capsules as links
@@ -59,19 +62,24 @@ from scenarios.recording.signals import described
 from scenarios.results import comparing, page, plan, pool, sampled, sampled_page, sections
 from scenarios.scene.drawn import scene
 from solvers import certify, explain, make, names
-from solvers.problems import Recipe, bounded, generate, structured
+from solvers.problems import ANY, KINDS, Recipe, bounded, generate, structured
+from solvers.problems import FAMILIES as SHAPES
+from solvers.problems import family as shaped
 from solvers.qp import backends
 
-ROOT = FOLDER.parents[2]
+ROOT = Path(__file__).parents[2]
+DATA = ROOT / "tests" / "data"
+FILE = DATA / "pinned" / "seen.json.gz"
 COMPUTED = computed.COMPUTED | computed_runs.COMPUTED | computed_bench.COMPUTED
-ROBOTS = [*sorted((FOLDER.parent / "robots").glob("*.xml")),
+ROBOTS = [*sorted((DATA / "robots").glob("*.xml")),
           *sorted((ROOT / "examples" / "robots").iterdir())]
 GROUPS = {file.stem: file.read_text(encoding="utf-8").splitlines()
-          for file in sorted((FOLDER.parent / "seen").glob("*.txt"))}
+          for file in sorted((DATA / "seen").glob("*.txt"))}
 # By scenario: seconds that are simulated.
 RUNS = {"ellipse": 0.2, "ellipse-hqp": 0.2, "dual-arm": 0.1, "human-hqp": 0.1, "wipe": 0.05,
         "reach-torque-smooth": 0.02}
-PLAIN = ("run ellipse", "run ellipse-hqp", "run dual-arm", "keys", "problems", "commands plain",
+PLAIN = ("run ellipse", "run ellipse-hqp", "run dual-arm", "keys", "problems", "seeds",
+         "shipped robots", "commands plain",
          *(f"computed {name}" for name in COMPUTED if name != "doubts"))
 # What `hierarchy doctor` finds: names of modules of Python.
 REQUIRED = ("json>=2", "calendar>=9", "csv", "string<2", "none>=3", "wave; sys_platform=='no'",
@@ -304,7 +312,8 @@ def _written(file):
         return json.loads(file.read_text())
     if file.suffix not in (".html", ".csv", ".toml") or file.parent.name == "runs":
         return ""
-    return _shown_on(file.read_text())
+    text = file.read_text()
+    return _shown_on(whole(text) if file.suffix == ".html" else text)
 
 
 def _shown_on(text):
@@ -312,6 +321,18 @@ def _shown_on(text):
     data = re.search(r'<script type="application/json" id="data">(.*?)</script>', text, re.DOTALL)
     return _cleaned(re.sub(r"<(style|script|iframe)\b.*?</\1>", "", text, flags=re.DOTALL)), (
         condensed(json.loads(data[1])) if data else "")
+
+
+def seen_of_pages():
+    """Of pages of comparisons by hand: with no run, of one tick, of odd names."""
+    odd = asked(title="<script>alert(1)</script> & co", pointing=None, avoidance=None)
+    failed = Run(odd, "hqp", "hqp", None, "HierarchyError: cannot <do>")
+    runs = [Run(one, of, of, recording(one, **more)) for one, of, more in (
+        (odd, "tpm", {}), (asked(), "tpm-published", {"t": [0.0]}),
+        (asked(name="other"), "tpm", {"fault": "diverged at tick 5"}))]
+    with steadily():
+        return [_shown_on(whole(page.comparison_page(Comparison(some, "compare", {}))))
+                for some in ([failed], [runs[0], failed], runs[1:2], runs[1:])]
 
 
 def seen_of_problems():
@@ -327,6 +348,41 @@ def seen_of_robots():
         {key: condensed(value) for key, value in robot_facts(robot).items()}, robot.missing,
         [condensed(dataclasses.astuple(one)) for one in links(Robot.from_file(file, shapes=False))]]
             for file in ROBOTS for robot in [Robot.from_file(file)]}
+
+
+def robot_facts(robot):
+    """Limits, rest, masses, and where all that is fixed to a body is in one posture."""
+    model, data = robot.model, robot.model.createData()
+    q = pin.integrate(model, robot.rest, np.sin(1.0 + np.arange(robot.n)))
+    pin.forwardKinematics(model, data, q)
+    pin.updateFramePlacements(model, data)
+    return {
+        "lower": robot.lower, "upper": robot.upper, "velocity_limit": robot.velocity_limit,
+        "effort_limit": robot.effort_limit, "rest": robot.rest, "masses": robot.masses,
+        "inertia": np.diag(pin.crba(model, data, q)), "gravity": pin.nonLinearEffects(
+            model, data, q, np.cos(np.arange(robot.n))),
+        "frames": {frame.name: [place.translation, *place.rotation]
+                   for frame, place in zip(model.frames, data.oMf, strict=True)},
+        "control_points": {point.name: data.oMi[point.joint].act(np.asarray(point.offset))
+                           for point in robot.control_points},
+        "capsules": {one.name: [*(data.oMi[one.joint].act(np.array(end, dtype=float))
+                                  for end in (one.start, one.end)), one.radius]
+                     for one in robot.capsules},
+        "end_effector": data.oMf[model.getFrameId(robot.end_effector)].translation}
+
+
+def seen_of_seeds():
+    """Of many generated problems, by what made them: a sum each, as seeds in reports mean them."""
+    def sums(made):
+        return [condensed([*h.rows, h.sizes, h.reference])[0] for h in made]
+
+    equalities = [structured(seed, equalities_only=True) for seed in range(40)]
+    return {**{f"kind {kind}": sums(structured(seed, (kind,)) for seed in range(60))
+               for kind in KINDS},
+            **{f"family {name}": sums(shaped(name, seed) for seed in range(30)) for name in SHAPES},
+            "any kind": sums(map(structured, range(40))), "equalities": sums(equalities),
+            "bounded": sums(map(bounded, equalities, range(40))),
+            "generated": sums(generate(seed, ANY) for seed in range(100))}
 
 
 def seen_of_computed(name):
@@ -423,12 +479,10 @@ def _rounding(number):
     return max(1.1 * 10.0 ** (int(exponent or 0) - places), 1e-7) if places or exponent else 0.0
 
 
-def _run(name, resolver="", ticks=0):
-    scenario = load(name)
-    duration = ticks * scenario.control.period if ticks else RUNS[name]
-    scenario = load(name, [f"control.duration={duration:.6g}"])
+def _run(name, ticks=0):
+    duration = ticks * load(name).control.period if ticks else RUNS[name]
     with steadily():
-        return simulate(scenario.with_resolver(resolver) if resolver else scenario)
+        return simulate(load(name, [f"control.duration={duration:.6g}"]))
 
 
 OF_PACKAGES = ("panda-ellipse", "romeo", "singular-panda", "singular-romeo", "stand-g1",
@@ -442,8 +496,9 @@ PARTS = {**{f"run {name}": partial(seen_of_run, name) for name in RUNS},
          "live page of a cone": partial(seen_of_live_page, "ellipse", position=None,
                                         avoidance=None),
          "live page of a table": partial(seen_of_live_page, "wipe"),
-         "keys": seen_of_keys, "figures": seen_of_figures,
-         "problems": seen_of_problems, "robots": seen_of_robots}
+         "keys": seen_of_keys, "figures": seen_of_figures, "pages": seen_of_pages,
+         "problems": seen_of_problems, "robots": seen_of_robots, "seeds": seen_of_seeds,
+         "shipped robots": lambda: {name: robot_facts(Robot.named(name)) for name in TABLES}}
 
 
 def seen(part):
@@ -453,4 +508,4 @@ def seen(part):
 
 if __name__ == "__main__":
     text = json.dumps({part: seen(part) for part in PARTS})
-    (FOLDER / "seen.json.gz").write_bytes(gzip.compress(text.encode(), mtime=0))
+    FILE.write_bytes(gzip.compress(text.encode(), mtime=0))

@@ -4,14 +4,12 @@ import numpy as np
 import pinocchio as pin
 import pytest
 from mechanisms import four_bar
-from pinned import leaves, read, robot_facts
 from refusals import refused
 from scene import compiled_rows
 from urdf_text import LIMIT, joint, link, loaded, placed, urdf
 
 from hierarchy import Robot, Stack, State
 from hierarchy.errors import RobotError, UnknownNameError
-from hierarchy.robots import TABLES
 from hierarchy.robots.found import Loop
 from hierarchy.robots.from_table import from_table
 from hierarchy.robots.table import Link, TreeFrame, TreeJoint, TreeTable
@@ -240,12 +238,6 @@ def test_joints_that_do_not_come_branch_after_branch_are_refused_by_name():
     state = State.at(Robot(found.model, "t", found=found), (0.1, 0.2, 0.3), (1.0, 2.0, 3.0))
     energy = pin.computeKineticEnergy(found.model, found.model.createData(), state.q, state.v)
     assert state.v @ state.mass_matrix() @ state.v / 2 == pytest.approx(energy)
-
-
-@pytest.mark.parametrize("name", TABLES)
-def test_a_shipped_robot_is_the_one_that_recorded_runs_were_made_with(name):
-    found, expected = leaves(robot_facts(Robot.named(name))), leaves(read("robots")[name])
-    assert found == pytest.approx(expected, rel=1e-9, abs=1e-9)
 
 
 PERIOD = 0.001  # [s]

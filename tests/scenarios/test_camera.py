@@ -1,9 +1,8 @@
 """The simulated depth camera, and distances out of its images.
 
-Depths, errors and clock are those of known geometry, distances those of all pixels one by one.
+Depths are those of known geometry, distances those of all pixels one by one.
 """
 
-from functools import partial
 from math import inf
 from pathlib import Path
 from runpy import run_path
@@ -18,7 +17,6 @@ from hierarchy.avoidance import ControlPoint, Obstacle, Obstacles
 from hierarchy.avoidance.body import pack_capsules
 from scenarios import load, simulate
 from scenarios.cell.robot import on_column
-from scenarios.cell.sensors import DepthSensor
 from scenarios.cell.sensors.camera import DepthCamera, Pinhole, RecordedFrames, looking_at
 from scenarios.cell.sensors.depth_sensor import DepthSpace, ObstacleImage
 from scenarios.cell.sensors.rendering import draw_robot
@@ -26,8 +24,7 @@ from scenarios.cell.sensors.sensor import ExactDistances
 from scenarios.config.sections.sensor import CameraSection, ImageSection
 
 STATE = State.at(ROBOT, [0.9, -0.9, 0.9, 1.2, 1.0, 1.8, 0.0])
-SMALL = {"width": 80, "height": 60, "fx": 70.0, "fy": 65.0}
-IDEAL = {"ideal": True, "near": 0.0, "far": 1e9}
+IDEAL = CameraSection(kind="camera", backdrop=0.0, ideal=True, near=0.0, far=1e9)
 SHAPES = {
     "sphere": Obstacle("sphere", (0.1, 0.0, 2.0), (0.3,)),
     "capsule": Obstacle("capsule", (-0.1, 0.1, 2.0), (0.1, 0.4), TURN),
@@ -38,20 +35,6 @@ SHAPES = {
     "sphere half outside": Obstacle("sphere", (1.1, 0.5, 2.0), (0.3,)),
     "box around the camera's plane": Obstacle("box", (0.4, 0.0, 0.0), (0.1, 0.1, 1.0)),
     "capsule past the camera": Obstacle("capsule", (0.3, 0.1, 0.2), (0.1, 1.0))}
-
-
-def camera(*obstacles, errors=IDEAL, capsules=(), pinhole=None, **settings):
-    section = CameraSection(**{"kind": "camera", "backdrop": 0.0, **errors, **settings})
-    return DepthCamera(section, pinhole or Pinhole(**SMALL), Obstacles(obstacles), capsules)
-
-
-def wall(depth=2.0, **settings):
-    """A wall that fills the image, with the default errors."""
-    return camera(backdrop=depth, **{"errors": {}, **settings})
-
-
-def depths(taken):
-    return taken.image(0, STATE)[0].astype(float)
 
 
 def traced(obstacle, pinhole, u, v):
@@ -70,7 +53,9 @@ def traced(obstacle, pinhole, u, v):
 @pytest.mark.parametrize("name", SHAPES)
 def test_every_pixel_has_the_depth_at_which_its_ray_meets_the_shape(name):
     """Sphere tracing needs nothing but the distance function; grazing rays are left out."""
-    pinhole, seen = Pinhole(**SMALL), depths(camera(SHAPES[name]))
+    pinhole = Pinhole(width=80, height=60, fx=70.0, fy=65.0)
+    seen = DepthCamera(IDEAL, pinhole, Obstacles([SHAPES[name]]), ()).image(0, STATE)[0]
+    seen = seen.astype(float)
     assert (seen > 0.0).sum() > 20
     beside = np.zeros_like(seen)
     for axis, step in ((0, 1), (0, -1), (1, 1), (1, -1)):
@@ -82,22 +67,6 @@ def test_every_pixel_has_the_depth_at_which_its_ray_meets_the_shape(name):
         assert seen[i, j] == pytest.approx(traced(SHAPES[name], pinhole, j, i), rel=2e-6), (i, j)
 
 
-@pytest.mark.parametrize("depth", [1.0, 3.0])
-def test_noise_has_the_stated_size_and_a_bound(depth):
-    errors = {"step": 0.0, "missing": 0.0, "missing_at_edges": 0.0, "outliers": 0.0}
-    off = depths(wall(depth, errors=errors)) - depth
-    sigma = 1.2e-3 + 1.9e-3 * (depth - 0.4) ** 2
-    assert abs(off.mean()) < 0.05 * sigma
-    assert off.std() == pytest.approx(sigma, rel=0.05)
-    assert np.abs(off).max() <= 3.5 * sigma + 1e-6
-
-
-def test_a_camera_faces_what_it_looks_at_with_the_middle_of_its_pixels():
-    assert (Pinhole(**SMALL).cx, Pinhole(**SMALL).cy) == (39.5, 29.5)  # of 0 to 79, of 0 to 59
-    R = looking_at([0.0, 0.0, 1.0], [0.0, 1.0, 1.0])
-    np.testing.assert_allclose(R, [[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, -1.0, 0.0]], atol=1e-15)
-
-
 # -- distances out of images -----------------------------------------------------------------------
 CAPSULES = on_column(ROBOT, ROBOT.capsules, 0.31)
 FACING = Pinhole(101, 81, 100.0, 100.0)  # at the origin, z forward, its middle in pixel (50, 40)
@@ -105,9 +74,9 @@ SIDE = Pinhole(320, 240, 262.0, 262.0, position=(0.3, 2.2, 0.8),
                rotation=looking_at((0.3, 2.2, 0.8), (0.0, 0.3, 0.1)))
 
 
-def space_of(pinhole, points, capsules, region, mean_within=(inf, inf), pairs=False, **settings):
+def space_of(pinhole, points, capsules, region, mean_within=(inf, inf), **settings):
     section = ImageSection(kind="camera", region=region, **settings)
-    exact = ExactDistances(ROBOT, Obstacles(), mean_within=mean_within, pairs=pairs)
+    exact = ExactDistances(ROBOT, Obstacles(), mean_within=mean_within)
     exact.points = points
     return DepthSpace(section, pinhole, exact, capsules, region)
 
@@ -162,21 +131,10 @@ def test_distances_and_directions_are_those_of_all_pixels_one_by_one(share, thin
     assert seen_some > 12
 
 
-def test_a_point_in_the_shadow_of_an_obstacle_touches_it_and_leaves_it_where_it_ends_first():
-    image = np.zeros((81, 101))
-    image[20:61, 40:91] = 0.7  # its left side is 10 pixels off the point, all others farther
-    seen = seen_in(image, (0.0, 0.0, 1.0), mean_within=(0.0, 0.0), pairs=True)
-    assert seen.distance[0] == pytest.approx(0.0, abs=1e-9)
-    assert seen.direction[0] @ (-1.0, 0.0, 0.0) > 0.99
-    np.testing.assert_array_equal(seen.pairs.direction[0, 0], seen.direction[0])
-
-
-camera_of = partial(camera, capsules=CAPSULES, pinhole=SIDE, backdrop=4.0)
-
-
 def test_the_arm_does_not_avoid_itself():
     """Wherever it is, and whatever the camera gets wrong but for outliers in blobs."""
-    camera = camera_of(errors={"outliers": 0.0})
+    section = CameraSection(kind="camera", backdrop=4.0, outliers=0.0)
+    camera = DepthCamera(section, SIDE, Obstacles(), CAPSULES)
     space = space_of(SIDE, ExactDistances(ROBOT, Obstacles()).points, CAPSULES, region=0.4)
     rng, obstacles = np.random.default_rng(8), ObstacleImage.empty(SIDE.height, SIDE.width)
     for i in range(60):
@@ -184,34 +142,6 @@ def test_the_arm_does_not_avoid_itself():
         space.find_obstacles(*camera.image(i, state), obstacles)
         assert (camera.scene < 3.9).mean() > 0.005
         assert np.isinf(space.measure(obstacles, state.placements).distance).all()
-
-
-def sensor_of(source):
-    """A sensor, and a function that gives a state at a time."""
-    space = space_of(source.pinhole, ExactDistances(ROBOT, Obstacles()).points, CAPSULES, 0.4)
-    section = ImageSection(kind="camera", stale_after=0.2, least_readings=0.1)
-    return DepthSensor(section, source, space), lambda t: State.at(ROBOT, STATE.q, t=t)
-
-
-def test_frames_are_used_from_their_latency_on_until_the_next_or_a_clock_is_set_back():
-    sensor, state_at = sensor_of(camera_of(rate=10.0, latency=0.05))
-    stamps = {0.0: -inf, 0.04: -inf, 0.05: 0.0, 0.1: 0.0, 0.15: 0.1, 0.29: 0.1, 0.35: 0.29}
-    assert {t: sensor.measure(state_at(t)).stamp for t in stamps} == stamps
-    sensor, state_at = sensor_of(camera_of(rate=10.0))
-    assert [sensor.measure(state_at(t)).stamp for t in (0.0, 0.5, 0.1)] == [0.0, 0.5, 0.1]
-
-
-@pytest.mark.parametrize("how", ["stopped", "covered"])
-def test_a_camera_that_stops_or_is_covered_is_blind_after_its_time_and_sees_again(how):
-    sensor, state_at = sensor_of(camera_of(Obstacle("sphere", (0.4, 0.7, 0.2), (0.1,)), rate=20.0))
-    blind, distances = [], set()
-    for k in range(100):
-        setattr(sensor, how, 0.295 < 0.01 * k < 0.695)
-        seen = sensor.measure(state_at(0.01 * k))
-        blind += [k] * seen.blind
-        distances.add(seen.minimal_distance)
-    assert blind == list(range(46, 70))  # the last image is of 0.25 s, and serves for 0.2 s
-    assert len(distances) == 1  # the last image is kept
 
 
 QUICK = ["sensor={kind='camera', position=[0.3, 2.2, 0.8], look_at=[0.0, 0.3, 0.1], width=160, "
@@ -264,14 +194,3 @@ def test_frames_that_cannot_be_used_are_refused_by_name(tmp_path):
         for png in folder.glob("*.png"):
             (tmp_path / png.name).write_bytes(png.read_bytes())
         refused(said, RecordedFrames, tmp_path, ROBOT)
-
-
-def test_an_obstacle_at_a_point_of_the_robot_is_refused_at_the_start():
-    def exact(centre):
-        return ExactDistances(ROBOT, Obstacles((Obstacle("point", centre),)))
-
-    points = exact((9.0, 9.0, 9.0)).measure(STATE).points.copy()
-    for k, said in ((0, "control point 1"), (-2, f"control point {len(points) - 1}"),
-                    (-1, "end effector")):
-        refused(f"touches {said} (", exact(tuple(points[k])).check_start, STATE)
-    exact(tuple(points[0] + 1e-8)).check_start(STATE)

@@ -3,7 +3,6 @@
 import sys
 from pathlib import Path
 
-import numpy as np
 import pytest
 
 import scenarios.config.reading as groups_of
@@ -50,25 +49,6 @@ def test_a_file_is_beside_the_one_that_names_it_or_in_the_working_directory_of_a
         assert keys["robot.model"].choice == (f"{tmp_path}/a.urdf", "kuka_lwr")
         assert keys["a.path.file"].choice == (f"{tmp_path}/b",)
     assert found.with_changes({"robot.model": "c.urdf"}).robot.model == f"{tmp_path}/base/c.urdf"
-
-
-def test_waypoints_of_obstacles_vary_within_their_spread_and_half_the_time_beside_them():
-    def paths(seed, spread, timing):
-        change = f"avoidance.variation={{seed={seed}, spread={spread}, timing={timing}}}"
-        return [(np.array(one.path.times), np.array(one.path.points))
-                for one in load("human", [change]).avoidance.placed]
-
-    away = []
-    for seed in range(20):
-        for (t, p), (times, points) in zip(paths(0, 0.0, 0.0), paths(seed, 0.1, 0.9), strict=True):
-            away += np.linalg.norm(points - p, axis=1).tolist()
-            room = np.append(np.minimum(np.diff(t)[:-1], np.diff(t)[1:]), np.diff(t)[-1]) / 2.0
-            assert (np.abs(times - t) <= 0.9 * np.r_[0.0, room] + 1e-12).all()
-            np.testing.assert_array_equal((points[1:] == points[:-1]).all(axis=1),
-                                          (p[1:] == p[:-1]).all(axis=1))  # where it rests
-    assert len(np.unique(away)) > 20
-    assert max(away) <= 0.1
-    assert np.median(away) == pytest.approx(0.1 * 0.5 ** (1.0 / 3.0), rel=0.05)  # of a ball
 
 
 def test_every_key_has_a_meaning_and_the_page_of_keys_is_as_the_program_has_them(monkeypatch):

@@ -15,13 +15,9 @@ from scenarios import load, simulate
 NOTEBOOKS = sorted((Path(__file__).parents[2] / "docs" / "notebooks").glob("*.ipynb"))
 
 
-@pytest.fixture(scope="module")
-def run():
-    return simulate(load("ellipse", ["control.duration=0.02"]))
-
-
 @pytest.mark.parametrize("library", ["pandas", "polars"])
-def test_a_data_frame_has_a_column_for_each_number(run, library, monkeypatch):
+def test_a_data_frame_has_a_column_for_each_number(library, monkeypatch):
+    run = simulate(load("ellipse", ["control.duration=0.02"]))
     fake = types.ModuleType(library)
     fake.DataFrame = dict
     for name in ("pandas", "polars"):  # None: the import fails
@@ -36,30 +32,17 @@ def test_a_data_frame_has_a_column_for_each_number(run, library, monkeypatch):
 
 
 @pytest.mark.parametrize("path", NOTEBOOKS, ids=lambda path: path.stem)
-def test_the_notebooks_of_the_documents_run_and_print_what_is_stored_up_to_numbers(
+def test_a_notebook_of_the_documents_runs_and_prints_what_is_stored_up_to_numbers(
         path, tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
-    names = {"__name__": "__main__"}
-    for number, cell in enumerate(cells_of(path, "code")):
+    text, names = path.read_text(encoding="utf-8"), {"__name__": "__main__"}
+    assert not re.search(r"/(home|root|tmp|work|Users)/", text), "paths of a machine"
+    cells = json.loads(text)["cells"]
+    assert len({cell["id"] for cell in cells}) == len(cells)
+    for number, cell in enumerate((one for one in cells if one["cell_type"] == "code"), 1):
         exec(compile("".join(cell["source"]), f"{path.name}, code cell {number}", "exec"), names)
         stored = "".join("".join(out.get("text", "")) for out in cell["outputs"])
         said, stored = (re.sub(r"-?\d[\d.e+-]*", "#", text)
                         for text in (capsys.readouterr().out, stored))
-        assert said == stored
-
-
-@pytest.mark.parametrize("path", NOTEBOOKS, ids=lambda path: path.stem)
-def test_notebooks_are_stored_with_their_outputs_and_no_paths_of_a_machine(path):
-    assert all(cell["outputs"] for cell in cells_of(path, "code"))
-    assert [cell["execution_count"] for cell in cells_of(path, "code")] == list(
-        range(1, 1 + len(cells_of(path, "code"))))
-    assert not any(out["output_type"] == "error" for cell in cells_of(path, "code")
-                   for out in cell["outputs"])
-    assert not re.search(r"/(home|root|tmp|work|Users)/", path.read_text(encoding="utf-8"))
-    assert len({cell["id"] for cell in cells_of(path)}) == len(cells_of(path))
-
-
-def cells_of(path, kind=None):
-    """The cells of a notebook, of one kind."""
-    return [cell for cell in json.loads(path.read_text(encoding="utf-8"))["cells"]
-            if kind in (None, cell["cell_type"])]
+        assert (said, cell["execution_count"]) == (stored, number)
+        assert "error" not in [out["output_type"] for out in cell["outputs"]] != []

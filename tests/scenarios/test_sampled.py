@@ -7,13 +7,16 @@ import subprocess
 import sys
 from unittest import mock
 
+import numpy as np
 import pytest
 from deadly import dies_of_one
 from refusals import refused
+from scipy.stats import PermutationMethod, wilcoxon
 
 from scenarios import load, shipped, simulate
 from scenarios.config.sampling import drawn
 from scenarios.measure import metrics
+from scenarios.measure.statistics import EXACT, paired
 from scenarios.results import plan as plan_of
 from scenarios.results import pool
 from scenarios.results.plan import Job, Outcome, load_sweep, outcome, plan, shipped_sweeps
@@ -88,24 +91,19 @@ def test_every_shipped_sweep_can_be_planned_and_every_scenario_varies():
         assert first != second
 
 
-def test_runs_are_made_again_after_a_file_that_their_scenario_names_has_changed(tmp_path):
-    motion, keys = tmp_path / "motion.csv", []
+def test_runs_are_made_again_after_a_file_that_they_read_has_changed(tmp_path):
+    """A motion that the scenario names, a file that the robot's file includes."""
+    motion, robot, keys, digests = tmp_path / "motion.csv", tmp_path / "whole.xml", [], []
     path = f"position.path={{kind='recorded', file='{motion}'}}"
-    for height in (0.1, 0.1, 0.2):
-        motion.write_text(f"t,x,y,z\n0,0,0.6,0.1\n1,0,0.6,{height}\n")
+    robot.write_text('<mujoco><worldbody><include file="part.xml"/></worldbody></mujoco>')
+    for value in "115":
+        motion.write_text(f"t,x,y,z\n0,0,0.6,0.1\n1,0,0.6,0.{value}\n")
         planned = plan(load_sweep(write(tmp_path, "")), [load("ellipse", [path])])
         keys.append({one.key for one in planned.runs})
+        (tmp_path / "part.xml").write_text(f'<mujocoinclude><geom size="1" mass="{value}"/></>')
+        digests.append(plan_of._content(str(robot)))
     assert keys[0] == keys[1]
     assert not keys[0] & keys[2]
-
-
-def test_runs_are_made_again_after_a_file_that_a_robots_file_includes_has_changed(tmp_path):
-    (tmp_path / "whole.xml").write_text(
-        '<mujoco><worldbody><include file="part.xml"/></worldbody></mujoco>')
-    digests = []
-    for mass in "115":
-        (tmp_path / "part.xml").write_text(f'<mujocoinclude><geom size="1" mass="{mass}"/></>')
-        digests.append(plan_of._content(str(tmp_path / "whole.xml")))
     assert digests[0] == digests[1] != digests[2]
 
 
@@ -126,6 +124,22 @@ def test_the_rows_are_the_same_in_processes_in_parts_and_on_a_cluster(tmp_path, 
     assert first == second == third
     assert sum(metric == "reached_end" for _, _, metric in first) == 6
     assert ("tpm", "2", "start.q.6") in first
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_the_p_value_is_that_of_all_signs_with_and_without_ties(seed):
+    random = np.random.default_rng(seed)
+    first = random.normal(size=9)
+    second = first + 0.4 + random.normal(size=9)
+    assert paired(first, second).p == pytest.approx(wilcoxon(second - first, method="exact")[1])
+    second = np.random.default_rng(seed).integers(-2, 5, 11).astype(float)
+    assert paired(np.zeros(11), second).p == pytest.approx(wilcoxon(
+        second[second != 0.0], method=PermutationMethod(n_resamples=np.inf))[1])
+    for count, method in ((EXACT, "exact"), (EXACT + 1, "asymptotic")):
+        apart = 0.2 + random.normal(size=count)
+        assert paired(np.zeros(count), apart).p == pytest.approx(wilcoxon(apart, method=method)[1])
+        counts = random.integers(50, 900, count) + random.integers(0, 5, (2, count))
+        assert paired(*counts / 1257.0).p == paired(*counts * 8.0).p  # shares tie to rounding
 
 
 def test_a_run_that_kills_its_process_costs_only_itself(tmp_path, capfd):

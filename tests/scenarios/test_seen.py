@@ -5,13 +5,21 @@ import json
 from operator import eq
 
 import pytest
-from pinned import FOLDER, leaves
-from seen import PARTS, PLAIN, alike, seen
+from seen import FILE, PARTS, PLAIN, alike, seen
 
 
 @pytest.fixture(scope="module")
 def before():
-    return json.loads(gzip.decompress((FOLDER / "seen.json.gz").read_bytes()))
+    return json.loads(gzip.decompress(FILE.read_bytes()))
+
+
+def leaves(value, path=""):
+    """What is in nested lists and dictionaries, by its place."""
+    if not isinstance(value, (dict, list)):
+        return {path: value}
+    items = value.items() if isinstance(value, dict) else enumerate(value)
+    return {place: leaf for key, one in items
+            for place, leaf in leaves(one, f"{path} {key}").items()}
 
 
 @pytest.mark.parametrize("part", PARTS)

@@ -11,10 +11,11 @@ from refusals import refused
 import scenarios.loop.simulation
 from benchmark.studies.reference_runs import EVERY, RIGHT, RUNS, differences, reference
 from scenarios import load, load_run, save, simulate
+from scenarios.cell.build import build
 from scenarios.export import export
 from scenarios.loop.recorder import Recorder
-from scenarios.measure.judging import Rows
-from scenarios.recording.fate import Fate
+from scenarios.measure.judging import Rows, judge
+from scenarios.recording.fate import Fate, levels_at
 
 SHORT = ["control.duration=3.0"]
 
@@ -75,6 +76,15 @@ def test_a_run_interrupted_while_its_levels_are_judged_is_kept(monkeypatch, tmp_
     run = load_run(save(simulate(load("ellipse", ["control.duration=0.01"])), tmp_path / "run"))
     assert (run.ticks, run.fault) == (10, "interrupted after the last tick")
     assert ((run["level_fate"] == Fate.UNKNOWN).all(axis=1) == (np.arange(10) >= 5)).all()
+
+
+def test_distances_that_are_not_those_recorded_leave_levels_unknown():
+    recording = simulate(load("ellipse", ["control.duration=1.5"]))
+    recording.signals["control_point_distance"] += 1e-3
+    judge(recording, build(recording.scenario))
+    levels = levels_at(recording, [0, 700])
+    assert (levels.fate == Fate.UNKNOWN).any(axis=1).all()
+    assert np.isnan(levels.violation).all()
 
 
 @pytest.mark.parametrize(("given", "said"), [

@@ -1,4 +1,4 @@
-"""A robot in MuJoCo with torque motors: its physics, and contacts before they are trusted."""
+"""A robot in MuJoCo with torque motors or servos: its physics, contacts before they are trusted."""
 
 from functools import partial
 
@@ -11,12 +11,14 @@ from standing import IDEAL, ROBOT, accelerations, feet, moving_state
 from urdf_text import INERTIAL, LIMIT, joint, link, urdf
 
 from hierarchy import Robot, State
+from hierarchy.avoidance import Obstacles
 from hierarchy.contacts import Contacts
 from scenarios import load
 from scenarios.cell.build import build
+from scenarios.cell.plants import PhysicsArm
 from scenarios.cell.plants.torque import TorqueRobot
 from scenarios.config import ScenarioError
-from scenarios.config.sections.plant import PushSection, TorqueSection
+from scenarios.config.sections.plant import PhysicsSection, PushSection, TorqueSection
 from scenarios.loop.controller import Controller
 
 pytestmark = pytest.mark.usefixtures("with_mujoco")
@@ -132,3 +134,43 @@ def test_a_robot_that_is_put_on_the_floor_is_carried_from_the_first_tick_on():
     cell.plant.act(controller.command(0.0, cell.plant.q, cell.plant.v))
     assert cell.plant.extra["floor_force"][:, 2].min() > 1.0
     assert np.abs(cell.plant.v[6:]).max() < 0.2
+
+
+# -- an arm in MuJoCo ------------------------------------------------------------------------------
+ARM, Q = Robot.named("kuka_lwr"), np.array([0.923, -0.854, 0.903, 1.195, 0.971, 1.796, 0.0])
+
+
+def test_inertia_gravity_and_coriolis_forces_are_those_of_the_robots_model():
+    import mujoco
+
+    section = PhysicsSection(kind="mujoco", joints={"armature": 0.0})
+    plant = PhysicsArm(ARM, Q, np.zeros(7), 0.005, "velocity", Obstacles(()), section)
+    model, data = plant.model, plant.data
+    rng, M = np.random.default_rng(5), np.zeros((7, 7))
+    for _ in range(20):
+        q, v = rng.uniform(ARM.lower, ARM.upper), rng.normal(size=7)
+        data.qpos[:], data.qvel[:] = q, v
+        mujoco.mj_forward(model, data)
+        for row, unit in zip(M, np.eye(7), strict=True):
+            mujoco.mj_mulM(model, data, row, unit)
+        state = State.at(ARM, q, v)
+        upper = np.triu(state.mass_matrix())
+        np.testing.assert_allclose(M, upper + np.triu(upper, 1).T, rtol=0, atol=1e-9)
+        np.testing.assert_allclose(data.qfrc_bias, state.bias_effort(), rtol=0, atol=1e-9)
+
+
+@pytest.mark.parametrize("level", ["acceleration", "velocity"])
+@pytest.mark.parametrize("far", [0.05, 0.3])
+def test_the_servos_of_a_joint_beyond_its_limit_are_led_back_without_a_jump(far, level):
+    """The reference once went to the limit at once, and its rate of 20 rad/s was kept."""
+    q = Q.copy()
+    q[3] = ARM.upper[3] + far
+    arm = PhysicsArm(ARM, q, np.zeros(7), 0.005, level)
+    command, reference = np.zeros(7), []
+    for k in range(100):
+        command[3] = -2.0 * (k < 50) if level == "acceleration" else -min(0.01 * k, 0.5)
+        arm.act(command)
+        reference.append(arm.reference_v[3])
+    assert np.abs(np.diff(reference, prepend=0.0)).max() <= 0.01 + 1e-12
+    assert arm.q[3] == pytest.approx(arm.reference_q[3], abs=0.01)
+    assert arm.q[3] < q[3] - 0.1
