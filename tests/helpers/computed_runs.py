@@ -17,7 +17,6 @@ from scenarios.cell.plants import torque
 from scenarios.cell.sensors.camera import DepthCamera, Pinhole
 from scenarios.config.distributions import Distribution, flat
 from scenarios.config.resolvers import default_resolvers
-from scenarios.config.sampling import drawn
 from scenarios.config.sections.sensor import CameraSection
 from scenarios.config.validation import _table
 from scenarios.draw.figures import drawing, letter
@@ -203,7 +202,7 @@ def sampled():
              *(np.r_[np.full(99, 8.0), beyond] for beyond in (20.0, 25.0)),  # twice as large these
              np.full(9, -8.0), np.zeros(9)]
     unasked = {"control.options.rank_tolerance": Distribution(uniform=(1e-9, 2e-9))}
-    return {"drawn": [str(drawn(load("ellipse"), unasked, 0, 0))],
+    return {"drawn": [str(load("ellipse").drawn(0, 0, unasked))],
             "verdicts": ["\n".join([*verdict(one), str(one.paired("speed_max", "b"))])
                          for one in runs], "kept": [str(one.shares()) for one in kept],
             "beyond": [text.get_text() for text in sampled_page._spread(
