@@ -5,6 +5,7 @@ from itertools import product
 from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from hierarchy.avoidance.body import Capsule, Vector
 from hierarchy.problem import Array
@@ -23,7 +24,7 @@ def capsules_of(shapes: Iterable[Shape]) -> tuple[tuple[Capsule, ...], tuple[str
             left_out.append(f"collision geometry {name!r} is a {kind}, for which there is no "
                             "capsule")
             continue
-        start, end = (_vector(placement.act(end)) for end in ends[:2])
+        start, end = (vector(placement.act(end)) for end in ends[:2])
         capsules.append(Capsule(name, joint, start, end, float(ends[2])))
     return tuple(capsules), tuple(left_out)
 
@@ -89,6 +90,7 @@ def _around(points: Array, axis: Array) -> Ends:
     return origin + low * axis, origin + high * axis, radius
 
 
-def _vector(point: Array) -> Vector:
-    x, y, z = (float(value) for value in point)
+def vector(values: ArrayLike) -> Vector:
+    """Return three numbers (3,) as a tuple."""
+    x, y, z = np.asarray(values, dtype=float).tolist()
     return x, y, z
