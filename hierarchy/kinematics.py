@@ -63,10 +63,15 @@ def turned(T, a):
 @inlined
 def write_point_jacobian(kinematics, joint, offset, A):
     """Write dp/dq of a point into the first three rows of A."""
-    J, point = kinematics.J, place(kinematics.placements[joint], offset)
+    J, supports = kinematics.J, kinematics.supports
+    x, y, z = place(kinematics.placements[joint], offset)
     for c in range(A.shape[1]):
-        A[0, c], A[1, c], A[2, c] = (carried(J[:3, c], J[3:, c], point)
-                                     if kinematics.supports[joint, c] else (0.0, 0.0, 0.0))
+        if supports[joint, c]:
+            A[0, c] = J[0, c] + J[4, c] * z - J[5, c] * y
+            A[1, c] = J[1, c] + J[5, c] * x - J[3, c] * z
+            A[2, c] = J[2, c] + J[3, c] * y - J[4, c] * x
+        else:
+            A[0, c], A[1, c], A[2, c] = 0.0, 0.0, 0.0
 
 
 @inlined
