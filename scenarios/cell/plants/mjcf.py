@@ -63,12 +63,15 @@ def scene(robot: Robot, q: Array, obstacles: Sequence[Obstacle], joints: JointsS
     """
     root, world = begin(robot, timestep, integrator="implicitfast")
     add(add(root, "default"), "geom", solref=(_SOFTNESS, 1.0), friction=_FRICTION)
-    drives = [each(getattr(joints, key), robot.n, f"plant.joints.{key}")
-              for key in ("friction", "damping", "armature")]
-    limits = [stop | {"actuatorgravcomp": "true"} | ({} if np.isinf(effort) else {
-        "actuatorfrclimited": "true", "actuatorfrcrange": (-effort, effort)})
-        for stop, effort in zip(_stops(robot, q), robot.effort_limit, strict=True)]
-    elements = _bodies(world, robot, drives, limits, gravcomp=servo.gravity)
+    friction, damping, armature = (
+        each(getattr(joints, key), robot.n, f"plant.joints.{key}")
+        for key in ("friction", "damping", "armature"))
+    drives = [{"frictionloss": friction[i], "damping": damping[i], "armature": armature[i],
+               "actuatorgravcomp": "true"} | stop for i, stop in enumerate(_stops(robot, q))]
+    for drive, effort in zip(drives, robot.effort_limit, strict=True):
+        if np.isfinite(effort):
+            drive |= {"actuatorfrclimited": "true", "actuatorfrcrange": (-effort, effort)}
+    elements = _bodies(world, robot, drives, gravcomp=servo.gravity)
     for capsule in robot.capsules:
         add(elements[capsule.joint], "geom", name=capsule.name, **_link(capsule),
             contype="1", conaffinity="0")
@@ -124,9 +127,11 @@ def on_floor(robot: Robot, contacts: Contacts, floor: TorqueSection, timestep: f
     root, world = begin(robot, timestep, cone="elliptic", integrator="Euler", tolerance=1e-12,
                         iterations="200")
     add(world, "geom", type="plane", name="the floor", size=(20, 20, 1), pos=(0, 0, floor.height))
-    drives = [of_drives(robot, key, getattr(floor, key)) for key in _DRIVE]
+    friction, damping, armature = (of_drives(robot, key, getattr(floor, key)) for key in _DRIVE)
     stops = _stops(robot, q) if floor.stops else [{}] * robot.n
-    elements, pairs = _bodies(world, robot, drives, stops, LEAST), add(root, "contact")
+    drives = [{"damping": damping[v], "armature": robot.model.armature[v] + armature[v],
+               "frictionloss": friction[v]} | stop for v, stop in enumerate(stops)]
+    elements, pairs = _bodies(world, robot, drives, LEAST), add(root, "contact")
     for contact in contacts.contacts:
         touching = f"contact {contact.name}"
         add(elements[contact.frame.joint], "geom", name=touching, contype="0",
@@ -161,16 +166,14 @@ def _capsules(elements: list[Element], contact: Element, robot: Robot, q: Array)
             friction=(_SKIN, _SKIN, 0, 0, 0))
 
 
-def _bodies(world: Element, robot: Robot, drives: Sequence[Array],
-            limits: Sequence[dict[str, ArrayLike]], least: tuple[float, float] = (0.0, 0.0),
-            **values: ArrayLike) -> list[Element]:
+def _bodies(world: Element, robot: Robot, drives: Sequence[dict[str, ArrayLike]],
+            least: tuple[float, float] = (0.0, 0.0), **values: ArrayLike) -> list[Element]:
     """Add bodies "body NAME" and their joints to a world; return it and the bodies' elements.
 
-    drives : friction, damping and armature of each velocity (n,). limits : its further attributes.
-    least : at least a mass [kg] and moments of inertia [kg m^2] more. values : of each body.
+    drives : attributes of the joint of each velocity (n). least : at least a mass [kg] and moments
+    of inertia [kg m^2] more. values : of each body.
     """
-    of_joint, own, elements = _axes(robot), robot.model.armature, [world]
-    friction, damping, armature = drives
+    of_joint, elements = _axes(robot), [world]
     for i, body in enumerate(robot.bodies()):
         element = add(elements[body.parent], "body", name=f"body {body.name}", pos=body.position,
                       xyaxes=axes(body.rotation), **values)
@@ -179,11 +182,10 @@ def _bodies(world: Element, robot: Robot, drives: Sequence[Array],
         add(element, "inertial", mass=max(body.mass, least[0]), pos=body.centre,
             fullinertia=I[[0, 1, 2, 0, 0, 1], [0, 1, 2, 1, 2, 2]])
         if i == 0 and robot.base == "floating":
-            add(element, "joint", type="free", armature=own[0])
+            add(element, "joint", type="free", armature=robot.model.armature[0])
             continue
         kind, axis, v = of_joint[i + 1]
-        add(element, "joint", name=body.name, type=kind, axis=axis, damping=damping[v],
-            armature=own[v] + armature[v], frictionloss=friction[v], **limits[v])
+        add(element, "joint", name=body.name, type=kind, axis=axis, **drives[v])
     return elements
 
 
