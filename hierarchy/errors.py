@@ -133,11 +133,13 @@ def positive(what: str, value: object, largest: float = inf) -> float:
     return found
 
 
-def real(what: str, value: object) -> float:
-    """Return a number, which may be infinite; raise a HierarchyError for anything else."""
+def real(what: str, value: object, least: float = -inf) -> float:
+    """Return a number from `least` on, maybe infinite; raise a HierarchyError for anything else."""
     found = as_float(value)
-    refuse(isnan(found), f"{what} = {value!r}: expected a number")
-    return found
+    if found >= least:
+        return found
+    shown = repr(value) if isnan(found) else f"{found:g}"
+    raise HierarchyError(f"{what} = {shown}: expected a number{_between(least, inf)}")
 
 
 def whole(what: str, value: object, least: int = 0, largest: int = _LARGEST) -> int:

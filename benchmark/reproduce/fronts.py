@@ -14,7 +14,6 @@ from matplotlib.figure import Figure
 from benchmark.reproduce.protocol import made, planned
 from hierarchy.problem import Array
 from scenarios.config import load
-from scenarios.config.sampling import drawn
 from scenarios.draw.figures.palette import looks
 from scenarios.measure.metric import Metric, finite, shown
 from scenarios.results.plan import Outcome
@@ -124,7 +123,7 @@ def _scores(name: str, method: Method, trials: Sequence[Mapping[str, float]],
         scenario = load(front.scenario, GIVEN["plant"].get(front.plant, {})).with_resolver(
             method.resolver).with_changes({**method.set, **settings})
         text = scenario.to_toml()
-        runs += [planned(scenario, text, start, drawn(scenario, scenario.variation, seed, start))
+        runs += [planned(scenario, text, start, scenario.drawn(seed, start))
                  for start in range(count)]
     kept = made(runs, *where)
     outcomes = [kept[one.key] for one in runs]

@@ -18,7 +18,6 @@ from benchmark.reproduce.avoidance import measured
 from hierarchy.problem import Array
 from scenarios.config import Scenario, load
 from scenarios.config.distributions import Value
-from scenarios.config.sampling import changed, drawn
 from scenarios.config.scenario import OWN
 from scenarios.files import make_folder, write_bytes
 from scenarios.results.plan import Job, Outcome, digest, key_of, outcome
@@ -149,7 +148,8 @@ def planned(scenario: Scenario, text: str, start: int, values: Mapping[str, Valu
 
 def work(job: Job) -> Outcome:
     """Make a run in a process of the pool."""
-    return outcome(job, lambda scenario: measured(changed(scenario, job.values, scenario.name)))
+    return outcome(job, lambda scenario: measured(
+        scenario.with_drawn(job.values, scenario.name)))
 
 
 def made(jobs: Sequence[Job], out: Path, workers: Workers, progress: Progress | None = None
@@ -204,7 +204,7 @@ def _runs(protocol: Protocol) -> Iterator[tuple[int, str, Job]]:
         scenario = column.load(changes, f"{name}-{layout}")
         text = scenario.to_toml()
         for seed, start in product(protocol.seeds, range(protocol.starts)):
-            values = drawn(scenario, scenario.variation, seed, start)
+            values = scenario.drawn(seed, start)
             if noisy:
                 values = _with_noise(values, protocol.noise, (seed, start))
             yield noisy, name, planned(scenario, text, start, values)

@@ -207,7 +207,7 @@ class Part:
     """Kernels that were compiled together: an object file, and the LLVM code that it was made of.
 
     checksums : of the members of its file.
-    calls : digest of the list of calls that it was made for.
+    calls : those that it was made for.
     functions : digest of the functions of C, which only the LLVM code has.
     entries : by name of the kernel and types of arguments, as `name(types)`.
     externals : the names that the object file expects to find.
@@ -215,7 +215,7 @@ class Part:
 
     name: str
     checksums: dict[str, int]
-    calls: str
+    calls: Sequence[str]
     functions: str
     entries: dict[str, Code]
     externals: Sequence[str]

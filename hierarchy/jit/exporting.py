@@ -6,7 +6,6 @@ compiled as it would be when called, for a processor that numba is told by its e
 process starts; only the machine code is made once, of all of them together.
 """
 
-import hashlib
 import platform
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
@@ -159,7 +158,7 @@ def build(name: str, calls: Sequence[str], functions: Mapping[str, Entry]) -> in
     machine_code = object_code(whole, machine())
     externals = sorted(one.name for one in (*whole.functions, *whole.global_variables)
                        if one.is_declaration and not one.name.startswith("llvm."))
-    write_part(name, (_of(calls), _digest(functions), entries, externals),
+    write_part(name, (calls, _digest(functions), entries, externals),
                machine=machine_code, llvm=code)
     return len(machine_code)
 
@@ -189,10 +188,6 @@ def _compiled(part: str, calls: Sequence[str]) -> tuple[dict[str, Code], list[An
 def is_current(name: str, calls: Sequence[str], functions: Mapping[str, Entry]) -> bool:
     """Whether a part was made of this list of calls and these functions as their sources are."""
     part = Part.read(name)
-    return part is not None and part.calls == _of(calls) and bool(stored(part, functions)) and all(
+    return part is not None and part.calls == calls and bool(stored(part, functions)) and all(
         entry.digest == source_digest(found(call.partition("(")[0]))
         for call, entry in part.entries.items())
-
-
-def _of(calls: Sequence[str]) -> str:
-    return hashlib.sha256("\n".join(calls).encode()).hexdigest()

@@ -22,12 +22,12 @@ _OWN = tuple(str(Path(__file__).with_name(f"{name}.py")) for name in (
 _KIND = re.compile(r"(readonly )?array\((\w+), (\d)d, (\w)\)|([\w.]+)(\()?|\)")
 
 
-def behind(functions: Iterable[Kernel]) -> tuple[set[str], set[str]]:
-    """Return digests of files of functions and all kernels that they know, and numbers in these.
+def behind(functions: Iterable[Kernel]) -> set[str]:
+    """Return digests of files of functions and all kernels that they know, numbers in these too.
 
     Those are numbers, arrays and the like that a kernel names, also of a function that made it.
     """
-    digests, constants, ahead, seen = set[str](), set[str](), list(functions), set[Any]()
+    texts, ahead, seen = set[str](), list(functions), set[Any]()
     while ahead:
         function = ahead.pop()
         known, code = function.__globals__, function.__code__
@@ -38,8 +38,8 @@ def behind(functions: Iterable[Kernel]) -> tuple[set[str], set[str]]:
             ahead += [value.py_func for value in used.values() if hasattr(value, "py_func")]
             numbers = {name: value.tolist() if hasattr(value, "tolist") else value for name, value
                        in used.items() if not callable(value) and type(value) is not ModuleType}
-            constants.add(f"{function.__qualname__}: {numbers!r}")
-        digests.add(getattr(function, "digest", "") or digest_of(function))
+            texts.add(f"{function.__qualname__}: {numbers!r}")
+        texts.add(getattr(function, "digest", "") or digest_of(function))
         if id(known) in seen:
             continue
         seen.add(id(known))
@@ -47,8 +47,8 @@ def behind(functions: Iterable[Kernel]) -> tuple[set[str], set[str]]:
             if hasattr(value, "py_func"):
                 ahead.append(value.py_func)
             elif name.isupper() and isinstance(value, (int, float, np.integer)):
-                constants.add(f"{name} = {value!r}")
-    return digests, constants
+                texts.add(f"{name} = {value!r}")
+    return texts
 
 
 def _named(names: tuple[str, ...], known: dict[str, Any]) -> dict[str, Any]:
@@ -67,11 +67,11 @@ def source_digest(*functions: Any) -> str:
     It is "" if a file is not to be found: that of a cell of a notebook, or in an archive.
     """
     try:
-        digests, constants = behind(getattr(one, "py_func", one) for one in functions)
-        content = "\n".join((*sorted(digests | set(map(_digest_of, _OWN))), *sorted(constants)))
+        content = behind(getattr(one, "py_func", one) for one in functions)
+        content |= set(map(_digest_of, _OWN))
     except OSError:
         return ""
-    return hashlib.sha256(content.encode()).hexdigest()
+    return hashlib.sha256("\n".join(sorted(content)).encode()).hexdigest()
 
 
 def digest_of(function: Kernel) -> str:

@@ -5,13 +5,14 @@ from itertools import product
 from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from hierarchy.avoidance.body import Capsule, Vector
 from hierarchy.problem import Array
 
 Ends = tuple[Array, Array, float]  # start (3,) [m], end (3,) [m] and radius [m] of a capsule
 Shape = tuple[str, str, int, Any, Ends | None]  # name, kind, joint, placement on it, capsule there
-CORNERS: Array = np.array(list(product((-1.0, 1.0), repeat=3)))
+_CORNERS: Array = np.array(list(product((-1.0, 1.0), repeat=3)))
 _MOST = 2000  # vertices of a mesh that are used to choose the axis
 
 
@@ -23,7 +24,7 @@ def capsules_of(shapes: Iterable[Shape]) -> tuple[tuple[Capsule, ...], tuple[str
             left_out.append(f"collision geometry {name!r} is a {kind}, for which there is no "
                             "capsule")
             continue
-        start, end = (_vector(placement.act(end)) for end in ends[:2])
+        start, end = (vector(placement.act(end)) for end in ends[:2])
         capsules.append(Capsule(name, joint, start, end, float(ends[2])))
     return tuple(capsules), tuple(left_out)
 
@@ -31,27 +32,28 @@ def capsules_of(shapes: Iterable[Shape]) -> tuple[tuple[Capsule, ...], tuple[str
 def of_coal(geometries: Any) -> Iterator[Shape]:
     """Yield the shapes of collision geometry as pinocchio reads it."""
     for one in geometries:
-        kind = type(one.geometry).__name__
+        shape, kind = one.geometry, type(one.geometry).__name__
+        sizes = shape.halfSide if kind == "Box" else [
+            getattr(shape, size, 0.0) for size in ("radius", "halfLength")]
+        points = next((getattr(shape, of_mesh)() for of_mesh in ("vertices", "points")
+                       if hasattr(shape, of_mesh)), ())
         yield (str(one.name), kind, int(one.parentJoint), one.placement,
-               _capsule_of(one.geometry, kind))
+               capsule_of(kind.lower(), sizes, points))
 
 
-def around_z(half: float, radius: float) -> Ends:
-    """Return the capsule of a half length [m] and radius [m] along z, about the origin."""
-    z = np.array([0.0, 0.0, 1.0])
-    return -half * z, half * z, radius
+def capsule_of(kind: str, sizes: Any, points: Any) -> Ends | None:
+    """Return the capsule around a shape, None for one without sizes and points (N, 3) [m].
 
-
-def _capsule_of(shape: Any, kind: str) -> Ends | None:
-    if kind in ("Sphere", "Capsule", "Cylinder"):
-        return around_z(0.0 if kind == "Sphere" else shape.halfLength, shape.radius)
-    if kind == "Box":
-        return bounding_capsule(CORNERS * shape.halfSide)
-    for of_mesh in ("vertices", "points"):
-        if hasattr(shape, of_mesh):
-            points = np.array(getattr(shape, of_mesh)(), dtype=float).reshape(-1, 3)
-            return bounding_capsule(points) if len(points) else None
-    return None
+    `sizes` [m] are radius and half length along z of a "sphere", "capsule" or "cylinder", and half
+    sides of a "box", or of the box around an "ellipsoid".
+    """
+    if kind in ("sphere", "capsule", "cylinder"):
+        half = np.array([0.0, 0.0, 0.0 if kind == "sphere" else sizes[1]])
+        return -half, half, sizes[0]
+    if kind in ("box", "ellipsoid"):
+        return bounding_capsule(_CORNERS * sizes)
+    points = np.array(points, dtype=float).reshape(-1, 3)
+    return bounding_capsule(points) if len(points) else None
 
 
 def bounding_capsule(points: Array) -> Ends:
@@ -88,6 +90,7 @@ def _around(points: Array, axis: Array) -> Ends:
     return origin + low * axis, origin + high * axis, radius
 
 
-def _vector(point: Array) -> Vector:
-    x, y, z = (float(value) for value in point)
+def vector(values: ArrayLike) -> Vector:
+    """Return three numbers (3,) as a tuple."""
+    x, y, z = np.asarray(values, dtype=float).tolist()
     return x, y, z

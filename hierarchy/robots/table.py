@@ -10,17 +10,11 @@ from hierarchy.gate import array_of, direction
 from hierarchy.records import Check, NotNegative, check_fields
 
 
-def _limit(what: str, value: object) -> float:
-    found = real(what, value)
-    refuse(found < 0.0, f"{what} = {found:g}: expected a number >= 0")
-    return found
-
-
 def _limits(what: str, values: object) -> None:
     found = array_of(what, values)
     refuse(found.ndim != 1, f"{what}: expected a list of numbers, got {brief(values)}")
     for i, value in enumerate(found):
-        _limit(f"{what}[{i}]", value)
+        real(f"{what}[{i}]", value, 0.0)
 
 
 def _pairs(what: str, values: object, of_joint: Check, remedy: str) -> None:
@@ -32,7 +26,6 @@ def _pairs(what: str, values: object, of_joint: Check, remedy: str) -> None:
 
 
 Base = Literal["fixed", "floating"]
-Name = Annotated[str, partial(expect, kind=str, remedy="give a name")]
 Vector = Annotated[tuple[float, float, float], partial(finite_numbers, size=3)]
 Numbers = Annotated[tuple[float, ...], finite_numbers]
 Limits = Annotated[tuple[float, ...], _limits]
@@ -50,7 +43,7 @@ class DHTable:
     offset (3,) [m] in the joint's frame). Raises HierarchyError for entries that do not fit.
     """
 
-    name: Name
+    name: str
     a: Numbers
     d: Numbers
     alpha: Numbers
@@ -95,13 +88,13 @@ class TreeJoint:
     the default initial configuration.
     """
 
-    name: Name
-    parent: Name
+    name: str
+    parent: str
     at: Vector
     axis: Literal["x", "y", "z"]
     range: Annotated[tuple[float, float], partial(finite_numbers, size=2)]
-    velocity: Annotated[float, _limit]
-    effort: Annotated[float, _limit]
+    velocity: Annotated[float, partial(real, least=0.0)]
+    effort: Annotated[float, partial(real, least=0.0)]
     link: Annotated[Link, partial(expect, kind=Link, remedy="give a Link")] = Link()
     rest: Annotated[float, number] = 0.0
 
@@ -118,8 +111,8 @@ class TreeFrame:
     Its axes are those of the joint, or turned so that z is `z_axis`.
     """
 
-    name: Name
-    joint: Name
+    name: str
+    joint: str
     offset: Vector
     z_axis: Annotated[tuple[float, float, float], direction] = (0.0, 0.0, 1.0)
 
@@ -136,10 +129,10 @@ class TreeTable:
     link), "" being the base, and `control_points` as (joint, offset (3,) [m]).
     """
 
-    name: Name
+    name: str
     joints: tuple[TreeJoint, ...]
     frames: tuple[TreeFrame, ...]
-    end_effector: Name
+    end_effector: str
     links: Annotated[tuple[tuple[str, Link], ...], partial(
         _pairs, of_joint=partial(expect, kind=Link, remedy="give a Link"),
         remedy="give (joint, link)")] = ()

@@ -4,14 +4,14 @@ from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass, replace
 from functools import cache
 from itertools import product
-from math import cos, inf, nan, radians
+from math import cos, inf, radians
 
 import numpy as np
 
 from hierarchy import Robot, Stack, State, Task
 from hierarchy.activation import Activation
 from hierarchy.allocation import AVOIDANCE, POINTING, POSITION, Allocation, allocate
-from hierarchy.avoidance import Measurement, Obstacles
+from hierarchy.avoidance import Measurement, Obstacles, SurveillanceAreas
 from hierarchy.contacts import Contacts
 from hierarchy.errors import check_name
 from hierarchy.jit import announce_compilation
@@ -116,38 +116,31 @@ def build(scenario: Scenario, kept: Cell | None = None) -> Cell:
 def _order(scenario: Scenario, tasks: Tasks) -> tuple[Order, Collection[tuple[str, ...]]]:
     """Return all tasks in every tick, or Algorithm 1 below those that are always at the top.
 
-    Without areas only the cone is switched, and the position has the repulsion of (30) within the
-    distance `tip` [m]. A cone that is an equality is always in the stack.
+    It allocates those of its tasks that there are. Without areas only the cone is switched, and the
+    position has the repulsion of (30). A cone that is an equality is always in the stack.
     """
+    names = tuple(task.name for task in tasks.all)
     if scenario.control.stack != "switched":
-        fixed = Allocation(tuple(task.name for task in tasks.all), repulsion=False)
-        return lambda seen, cone_error: fixed, [fixed.order]
-    areas, section = tasks.areas, scenario.avoidance
-    first = tuple(task.name for task in tasks.all
-                  if task.name not in (AVOIDANCE, POSITION, POINTING))
+        fixed = Allocation(names, repulsion=False)
+        return lambda seen, cone_error: fixed, [names]
+    first = tuple(name for name in names if name not in (AVOIDANCE, POSITION, POINTING))
     always_point = bool(scenario.pointing and scenario.pointing.rows == "equality")
-    tip = section.end_effector if isinstance(section, AvoidanceSection) else -inf
+    section = scenario.avoidance
+    tip = section.end_effector if isinstance(section, AvoidanceSection) else None
+    areas = tasks.areas or SurveillanceAreas(0.0, 0.0, tip or 0.0)
 
     @cache
-    def behind_first(chosen: Allocation) -> Allocation:
-        return Allocation((*first, *chosen.order), chosen.repulsion)
-
-    def chosen_at(body: float, end: float, cone_error: float) -> Allocation:
-        if areas is not None:
-            chosen = allocate(body, end, cone_error, areas, always_point)
-        else:
-            point = cone_error > 0.0 or always_point
-            chosen = Allocation((POSITION,) * (tasks.position is not None) + (POINTING,) * point,
-                                repulsion=end <= tip)
-        return behind_first(chosen) if first else chosen
+    def of_stack(chosen: Allocation) -> Allocation:
+        return Allocation((*first, *(name for name in chosen.order if name in names)),
+                          chosen.repulsion and tip is not None)
 
     def choose(seen: Measurement | None, cone_error: float) -> Allocation:
-        if seen is None:
-            return chosen_at(inf, inf, cone_error)
-        return chosen_at(seen.minimal_distance, seen.end_effector_distance, cone_error)
+        body, end = (inf, inf) if seen is None else (
+            seen.minimal_distance, seen.end_effector_distance)
+        return of_stack(allocate(body, end, cone_error, areas, always_point))
 
-    distances = (inf,) if areas is None else (areas.near, areas.far, inf)
-    return choose, {chosen_at(*at).order for at in product(distances, (0.0, inf), (1.0, nan))}
+    return choose, {of_stack(allocate(*at, areas, always_point)).order for at in product(
+        (areas.near, areas.far, inf), (0.0, inf), (1.0, -1.0))}
 
 
 def _rows(scenario: Scenario, tasks: Sequence[Task],

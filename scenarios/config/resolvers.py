@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections import Counter
 from collections.abc import Iterable, Sequence
 from typing import TYPE_CHECKING
 
@@ -49,11 +48,3 @@ def usable(scenario: Scenario, specs: Sequence[str] | None
             refused.append(f"{spec} is not run on {scenario.name}, which asks for {asked}: it "
                            f"resolves {resolver.handles}")
     return can, refused
-
-
-def check_names(scenarios: Sequence[Scenario], what: str = "") -> None:
-    """Raise HierarchyError, with `what` in front, if two scenarios have the same name."""
-    for name, count in Counter(scenario.name for scenario in scenarios).items():
-        if count > 1:
-            raise HierarchyError(f"{what}{count} scenarios are named {name!r}; give each its own "
-                                 "name")

@@ -5,19 +5,21 @@ from __future__ import annotations
 import dataclasses
 import tomllib
 from collections.abc import Iterator, Mapping
+from hashlib import sha256
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Self
 
+import numpy as np
 import tomli_w
 from pydantic import Field, field_validator
 
 import scenarios.config.sections.kinds  # noqa: F401, registers them
 from hierarchy import plugins
 from hierarchy.errors import expect
-from scenarios.config.changes import change_all, parse_changes, without_none
-from scenarios.config.distributions import Parameters
+from scenarios.config.changes import change_all, matching, parse_changes, place, without_none
+from scenarios.config.distributions import Distribution, Parameters, Value
 from scenarios.config.files import make_absolute
-from scenarios.config.sections import Name, Section
+from scenarios.config.sections import Name, Section, naming
 from scenarios.config.sections.avoidance import AvoidanceKind
 from scenarios.config.sections.control import RIVALS, ControlSection, FaultSection, unfit
 from scenarios.config.sections.plant import KinematicSection, PlantKind
@@ -236,6 +238,32 @@ class Scenario(Section):
         change_all(data, changes, Scenario)
         make_absolute(data, Path())
         return validated(Scenario, data, what or f"scenario {self.name!r}")
+
+    def drawn(self, seed: int, index: int, parameters: Mapping[str, Distribution] | None = None,
+              what: str = "variation") -> dict[str, Value]:
+        """Return the values of sample `index` by dotted key, by default those of its `variation`.
+
+        They depend only on the seed, the index and the key, "around" also on the scenario's value.
+        A `*` in a key stands for every entry of a list, each with a draw of its own. Raises
+        ScenarioError, which starts with `what` and the key, if there is no suitable value there.
+        """
+        own, values = self.model_dump(mode="json"), dict[str, Value]()
+        parameters = self.variation if parameters is None else parameters
+        for pattern, distribution in parameters.items():
+            with naming(f"{what}.{pattern}: scenario {self.name!r}", of=ValueError):
+                for key in matching(own, pattern):
+                    table, last = place(own, key)
+                    here = table[last] if isinstance(table, list) else table.get(last)
+                    # The same numbers on every machine, for one parameter of one sample.
+                    words = np.frombuffer(sha256(key.encode()).digest()[:16], dtype="<u4")
+                    chance = np.random.PCG64(np.random.SeedSequence([seed, index, *words.tolist()]))
+                    values[key] = distribution.draw(np.random.Generator(chance), here)
+        return values
+
+    def with_drawn(self, values: Mapping[str, Value], what: str) -> Scenario:
+        """As `with_changes`; the message starts with `what` and has the values."""
+        told = ", ".join(f"{key} = {value}" for key, value in values.items())
+        return self.with_changes(values, f"{what}, with {told}")
 
     def __repr__(self) -> str:
         return (f"Scenario({self.name!r}, robot={self.robot.model!r}, "

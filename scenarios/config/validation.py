@@ -9,7 +9,7 @@ from pydantic import ValidationError
 
 from hierarchy.errors import UnknownNameError, brief
 from hierarchy.words import listed
-from scenarios.config.sections import OneOf, ScenarioError, Section, Unit, kinds_of
+from scenarios.config.sections import OneOf, ScenarioError, Section, Unit, kinds_of, shared
 
 Kind = TypeVar("Kind", bound=Section)
 _USUAL = {  # sizes that are not doubted, by unit
@@ -50,8 +50,7 @@ def sections_at(root: type[Section], path: Sequence[str]) -> list[type[Section]]
 
 def unit_at(root: type[Section], path: Sequence[str]) -> str:
     """Return the unit of the key at a path, "" if there is none, or another for each kind."""
-    units = {unit.name for part in _annotations(root, path) for unit in parts_of(part, Unit)}
-    return units.pop() if len(units) == 1 else ""
+    return shared(unit.name for part in _annotations(root, path) for unit in parts_of(part, Unit))
 
 
 def _said(root: type[Section], data: Any, error: Any) -> str:
@@ -144,9 +143,8 @@ def doubtful_units(section: Section, above: str = "") -> Iterator[str]:
     """Yield what stands in a section in another unit than its own, by its size."""
     for name, field in type(section).model_fields.items():
         key, value = f"{above}{field.alias or name}", getattr(section, name)
-        units = {unit.name for unit in parts_of((field.annotation, *field.metadata), Unit)
-                 if unit.doubted}
-        unit = units.pop() if len(units) == 1 else ""
+        unit = shared(unit.name for unit in parts_of((field.annotation, *field.metadata), Unit)
+                      if unit.doubted)
         least, largest, remark = _USUAL.get(unit, (0.0, inf, ""))
         for where, one in leaves(value, key):
             if isinstance(one, Section):

@@ -56,8 +56,7 @@ class Controller:
         if cell.sensor is not None:
             cell.state.measurement = cell.sensor.measurement
         for order in cell.orders:
-            if set(order) <= set(cell.stack.names):
-                cell.stack.prepare(cell.state, order)
+            cell.stack.prepare(cell.state, order)
 
     @property
     def answered(self) -> bool:

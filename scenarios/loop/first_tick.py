@@ -10,7 +10,6 @@ from hierarchy.tasks.separation import SelfSeparation, inseparable_pairs
 from hierarchy.words import listed
 from scenarios.cell.build import Cell, build
 from scenarios.config import Scenario, ScenarioError
-from scenarios.config.sampling import changed, drawn
 from scenarios.config.validation import doubtful_units
 from scenarios.loop.controller import Controller
 from scenarios.loop.faults import check
@@ -60,7 +59,7 @@ def first_tick(scenario: Scenario) -> FirstTick:
 def _undrawn(scenario: Scenario) -> Iterator[str]:
     """Yield why no start can be drawn from the [variation] of a scenario."""
     try:
-        changed(scenario, drawn(scenario, scenario.variation, 0, 0), "variation")
+        scenario.with_drawn(scenario.drawn(0, 0), "variation")
     except ScenarioError as error:
         yield f"no sampled starts: {error}".removesuffix(".")
 

@@ -14,7 +14,6 @@ import numpy as np
 
 from hierarchy.problem import Array, Hierarchy
 from scenarios.config import Scenario, ScenarioError, load
-from scenarios.config.sampling import changed, drawn
 from scenarios.loop.controller import Controller
 from scenarios.loop.simulation import uninterrupted
 from solvers import certify, make
@@ -46,11 +45,11 @@ def ticks(seed: int) -> Iterator[tuple[Hierarchy, Array]]:
         {"limits.horizon": 0.0, "plant.stops": False, "plant.joint_friction": 0.0,
          "plant.joint_damping": 0.0, "plant.armature": 0.0}), 0  # as the set was recorded
     while True:
-        values = drawn(base, base.variation, seed, run)
+        values = base.drawn(seed, run)
         chance = np.random.default_rng([seed, run])
         first = int(chance.uniform(_FIRST, _LAST) / base.control.period)
         found = [_without(h, LEFT_OUT)
-                 for h in window(changed(base, values, "DYN60"), first, TOGETHER)]
+                 for h in window(base.with_drawn(values, "DYN60"), first, TOGETHER)]
         some = [(h, x) for h in found if (x := answer(h)) is not None]
         if len(some) == TOGETHER:
             yield from some
@@ -104,8 +103,8 @@ def recorded(name: str, seed: int, count: int) -> list[Hierarchy]:
         begin = float(np.random.default_rng([seed, 3]).uniform(*_WITHIN))
     first = int(begin * shipped.control.ticks)
     for run in range(_RUNS if seed else 1):
-        values = drawn(shipped, shipped.variation, seed, run) if seed else {}
-        found = window(changed(shipped, values, name), first, count)
+        values = shipped.drawn(seed, run) if seed else {}
+        found = window(shipped.with_drawn(values, name), first, count)
         if len(found) == count:
             return found
     raise ScenarioError(f"{name}: no run with seed {seed} has {count} problems from tick {first} "

@@ -12,16 +12,17 @@ import numpy as np
 
 from hierarchy import HierarchyError, Robot, State
 from hierarchy.avoidance import Capsule
+from hierarchy.avoidance.body import Vector
 from hierarchy.contacts import Contacts
 from hierarchy.problem import Array
 from hierarchy.robots import DHTable
+from hierarchy.robots.shapes import vector
 from hierarchy.robots.table import Base
 from scenarios.cell.robot import on_column, sensed_points
 from scenarios.config import Scenario
 from scenarios.config.sections.plant import TorqueSection
 from solvers.resolver import Handles
 
-Vector = tuple[float, float, float]
 Matrix = tuple[Vector, Vector, Vector]
 Setting = bool | int | float | str | tuple[float | str, ...] | None
 
@@ -160,7 +161,7 @@ def facts_of(scenario: Scenario, robot: Robot, contacts: Contacts | None = None)
     if isinstance(plant, TorqueSection) and facts.base == "floating":
         facts = replace(facts, floor=plant.height)
     points = tuple(ContactPoint(contact.name, contact.frame.joint,
-                                _vector(contact.frame.placed(point)), _vector(contact.axes[2]),
+                                vector(contact.frame.placed(point)), vector(contact.axes[2]),
                                 contact.friction)
                    for contact in (contacts.contacts if contacts else ())
                    for point in contact.points)
@@ -171,9 +172,9 @@ def robot_facts(robot: Robot, foot: float = 0.0) -> RobotFacts:
     """Return the facts of a robot; one given as a table stands on a column of height `foot` [m]."""
     foot = foot if isinstance(robot.table, DHTable) else 0.0
     links, tip = capsules(robot, foot), robot.frame(robot.end_effector)
-    points = tuple(Point(point.name, point.joint, _vector(point.offset))
+    points = tuple(Point(point.name, point.joint, vector(point.offset))
                    for point in sensed_points(robot))
-    x, y, z = (_vector(row) for row in tip.rotation)
+    x, y, z = (vector(row) for row in tip.rotation)
     units, chain = tuple(robot.velocity_units), tuple(range(len(robot.joint_names)))
     model, radii = robot.model.saveToString(), [link.radius for link in links]
     # The lowest point of the robot at rest, at most as high as its base.
@@ -207,11 +208,6 @@ def _plain(value: Any) -> Setting:
     return value if isinstance(value, (bool, int, float, str, type(None))) else repr(value)
 
 
-def _vector(values: Any) -> Vector:
-    x, y, z = np.asarray(values, dtype=float).tolist()
-    return x, y, z
-
-
 def capsules(robot: Robot, foot: float = 0.0) -> tuple[Capsule, ...]:
     """Return a robot's links: its capsules or, without any, sticks from joint to joint.
 
@@ -223,7 +219,7 @@ def capsules(robot: Robot, foot: float = 0.0) -> tuple[Capsule, ...]:
               if np.linalg.norm(stick[2]) > 0.0]
     radius = _STICK * max((float(np.linalg.norm(stick[2])) for stick in sticks), default=0.0)
     return on_column(robot, robot.capsules or tuple(
-        Capsule(name, joint, (0.0, 0.0, 0.0), _vector(way), radius)
+        Capsule(name, joint, (0.0, 0.0, 0.0), vector(way), radius)
         for name, joint, way in sticks), foot)
 
 

@@ -9,7 +9,8 @@ from numpy.typing import NDArray
 
 from hierarchy.problem import Array
 from scenarios.config import Scenario
-from scenarios.config.sections.tasks import JOINT, shared
+from scenarios.config.sections import shared
+from scenarios.config.sections.tasks import JOINT
 from scenarios.recording.recording import Recording
 
 

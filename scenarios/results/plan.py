@@ -21,8 +21,7 @@ from scenarios.config import Scenario, ScenarioError, is_shipped, load
 from scenarios.config import sections as keys
 from scenarios.config.distributions import Parameters
 from scenarios.config.files import files_in, make_absolute
-from scenarios.config.resolvers import check_names, usable
-from scenarios.config.sampling import changed, drawn
+from scenarios.config.resolvers import usable
 from scenarios.config.scenario import OWN
 from scenarios.config.sections import Name, Section
 from scenarios.config.validation import validated
@@ -230,14 +229,14 @@ def plan(sweep: Sweep, scenarios: Sequence[Scenario] | None = None) -> Plan:
             if sweep.variation and not scenario.variation:
                 raise ScenarioError(f"scenario {scenario.name!r} has no [variation] to sample "
                                     "from; add one, such as start.q = { around = 0.02 }")
-            own = scenario.variation if sweep.variation else {}
-            values = drawn(scenario, own, sweep.seed, index) | drawn(
-                scenario, sweep.parameters, sweep.seed, index, f"sweep {sweep.name!r}: parameters")
+            values = scenario.drawn(sweep.seed, index) if sweep.variation else {}
+            values |= scenario.drawn(sweep.seed, index, sweep.parameters,
+                                     f"sweep {sweep.name!r}: parameters")
             what = f"sweep {sweep.name!r}: sample {index} of scenario {scenario.name!r}"
             refuse("control.resolver" in values and {run.spec for run in columns} != {OWN},
                    f"{what}: control.resolver is drawn, but the resolvers of the sweep replace it; "
                    f"give it the one resolver {OWN!r}")
-            sample = changed(scenario, values, what)
+            sample = scenario.with_drawn(values, what)
             text = sample.to_toml()
             files = [table[key] for table, key in files_in(sample.model_dump(mode="json"))]
             for run in columns:
@@ -261,7 +260,8 @@ def side_by_side(scenarios: Sequence[Scenario], specs: Sequence[str] | None, wha
     HierarchyError : two scenarios of one name, with `what` in front; a scenario that does not fit
         its robot; an unknown resolver or setting; no resolver that can resolve any scenario.
     """
-    check_names(scenarios, what)
+    for name, count in Counter(scenario.name for scenario in scenarios).items():
+        refuse(count > 1, f"{what}{count} scenarios are named {name!r}; give each its own name")
     runs: list[Run] = []
     refused: list[str] = []
     for scenario in scenarios:

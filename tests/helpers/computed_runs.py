@@ -17,7 +17,6 @@ from scenarios.cell.plants import torque
 from scenarios.cell.sensors.camera import DepthCamera, Pinhole
 from scenarios.config.distributions import Distribution, flat
 from scenarios.config.resolvers import default_resolvers
-from scenarios.config.sampling import drawn
 from scenarios.config.sections.sensor import CameraSection
 from scenarios.config.validation import _table
 from scenarios.draw.figures import drawing, letter
@@ -205,7 +204,7 @@ def sampled():
     unasked = {"control.options.rank_tolerance": Distribution(uniform=(1e-9, 2e-9))}
     moved = [load("human", [f"avoidance.variation={{seed={seed}, spread=0.1, timing=0.9}}"])
              for seed in range(3)]
-    return {"drawn": [str(drawn(load("ellipse"), unasked, 0, 0))],
+    return {"drawn": [str(load("ellipse").drawn(0, 0, unasked))],
             "moved": [[one.path.times, one.path.points] for scenario in moved
                       for one in scenario.avoidance.placed],
             "verdicts": ["\n".join([*verdict(one), str(one.paired("speed_max", "b"))])

@@ -14,7 +14,6 @@ from refusals import refused
 from scipy.stats import PermutationMethod, wilcoxon
 
 from scenarios import load, shipped, simulate
-from scenarios.config.sampling import drawn
 from scenarios.measure import metrics
 from scenarios.measure.statistics import EXACT, paired
 from scenarios.results import plan as plan_of
@@ -87,7 +86,7 @@ def test_every_shipped_sweep_can_be_planned_and_every_scenario_varies():
         small = load_sweep(name).model_copy(update={"samples": 2})
         assert len(plan(small).runs) == 2 * len(small.resolvers) * len(small.scenarios)
     for scenario in map(load, shipped()):
-        first, second = (drawn(scenario, scenario.variation, 0, index) for index in range(2))
+        first, second = (scenario.drawn(0, index) for index in range(2))
         assert first != second
 
 

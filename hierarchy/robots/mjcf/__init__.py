@@ -3,9 +3,7 @@
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
-import numpy as np
 from numpy.typing import ArrayLike
 
 from hierarchy.errors import RobotError, naming
@@ -13,19 +11,11 @@ from hierarchy.robots.found import Found, neutral_within_limits, proposed_end_ef
 from hierarchy.robots.mjcf import constraints
 from hierarchy.robots.mjcf.model import Built, build, compare, configuration, pose
 from hierarchy.robots.mjcf.part import compiled, part_of
-from hierarchy.robots.shapes import (
-    CORNERS,
-    Ends,
-    Shape,
-    around_z,
-    bounding_capsule,
-    capsules_of,
-)
+from hierarchy.robots.shapes import Shape, capsule_of, capsules_of
 from hierarchy.robots.table import Base
 
-_PLANE, _HEIGHTS, _SPHERE, _CAPSULE, _ELLIPSOID, _CYLINDER, _BOX = range(7)  # mjtGeom
 _KINDS = ("plane", "height field", "sphere", "capsule", "ellipsoid", "cylinder", "box", "mesh",
-          "signed distance")
+          "signed distance")  # mjtGeom
 
 
 def read(path: Path, base: Base | None, shapes: bool, locked: Mapping[str, ArrayLike],
@@ -64,24 +54,15 @@ def _shapes(built: Built) -> Iterator[Shape]:
     mj = built.part.compiled.model
     paired = {*mj.pair_geom1.tolist(), *mj.pair_geom2.tolist()}
     for geom in range(mj.ngeom):
-        body, kind = int(mj.geom_bodyid[geom]), int(mj.geom_type[geom])
+        body, kind = int(mj.geom_bodyid[geom]), _KINDS[mj.geom_type[geom]]
         collides = mj.geom_contype[geom] or mj.geom_conaffinity[geom] or geom in paired
         if collides and body in built.part.bodies:
-            (joint, place), named = built.placed[body], _KINDS[kind]
-            name = mj.geom(geom).name or f"{built.part.compiled.bodies[body]} {named} {geom}"
-            yield (name, named, joint, place * pose(mj.geom_pos[geom], mj.geom_quat[geom]),
-                   _ends(mj, geom, kind))
-
-
-def _ends(mj: Any, geom: int, kind: int) -> Ends | None:
-    size = mj.geom_size[geom]
-    if kind in (_PLANE, _HEIGHTS):
-        return None
-    if kind in (_SPHERE, _CAPSULE, _CYLINDER):
-        return around_z(0.0 if kind == _SPHERE else size[1], size[0])
-    if kind in (_ELLIPSOID, _BOX):  # of an ellipsoid the box around it
-        return bounding_capsule(CORNERS * size)
-    mesh = mj.geom_dataid[geom]
-    first = mj.mesh_vertadr[mesh]
-    return bounding_capsule(np.array(mj.mesh_vert[first:first + mj.mesh_vertnum[mesh]],
-                                     dtype=float))
+            joint, place = built.placed[body]
+            name = mj.geom(geom).name or f"{built.part.compiled.bodies[body]} {kind} {geom}"
+            points = ()
+            if kind in ("mesh", "signed distance"):
+                mesh = mj.geom_dataid[geom]
+                first = mj.mesh_vertadr[mesh]
+                points = mj.mesh_vert[first:first + mj.mesh_vertnum[mesh]]
+            yield (name, kind, joint, place * pose(mj.geom_pos[geom], mj.geom_quat[geom]),
+                   capsule_of(kind, mj.geom_size[geom], points))

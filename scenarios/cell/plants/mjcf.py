@@ -15,7 +15,6 @@ from hierarchy.avoidance import Capsule, Obstacle
 from hierarchy.avoidance.body import measure_capsules, pack_capsules, pairs_of_tree
 from hierarchy.contacts import Contact, Contacts
 from hierarchy.problem import Array
-from hierarchy.robot import Body
 from scenarios.config import ScenarioError
 from scenarios.config.sections.plant import JointsSection, ServoSection, TorqueSection
 
@@ -49,17 +48,6 @@ def begin(robot: Robot, timestep: float, **option: ArrayLike) -> tuple[Element, 
     return root, add(root, "worldbody")
 
 
-def add_body(parent: Element, body: Body, least: tuple[float, float] = (0.0, 0.0),
-             **values: ArrayLike) -> Element:
-    """Add a body "body NAME", with at least a mass [kg] and moments of inertia [kg m^2] more."""
-    I = body.inertia + least[1] * np.eye(3)  # noqa: E741
-    element = add(parent, "body", name=f"body {body.name}", pos=body.position,
-                  xyaxes=axes(body.rotation), **values)
-    add(element, "inertial", mass=max(body.mass, least[0]), pos=body.centre,
-        fullinertia=I[[0, 1, 2, 0, 0, 1], [0, 1, 2, 1, 2, 2]])
-    return element
-
-
 def axes(rotation: ArrayLike) -> Array:
     """Return the x and y axes (6,) of a rotation (3, 3), as MJCF has them."""
     return np.asarray(rotation, dtype=float)[:, :2].T.ravel()
@@ -75,7 +63,18 @@ def scene(robot: Robot, q: Array, obstacles: Sequence[Obstacle], joints: JointsS
     """
     root, world = begin(robot, timestep, integrator="implicitfast")
     add(add(root, "default"), "geom", solref=(_SOFTNESS, 1.0), friction=_FRICTION)
-    _arm(world, robot, q, joints, servo)
+    friction, damping, armature = (
+        each(getattr(joints, key), robot.n, f"plant.joints.{key}")
+        for key in ("friction", "damping", "armature"))
+    drives = [{"frictionloss": friction[i], "damping": damping[i], "armature": armature[i],
+               "actuatorgravcomp": "true"} | stop for i, stop in enumerate(_stops(robot, q))]
+    for drive, effort in zip(drives, robot.effort_limit, strict=True):
+        if np.isfinite(effort):
+            drive |= {"actuatorfrclimited": "true", "actuatorfrcrange": (-effort, effort)}
+    elements = _bodies(world, robot, drives, gravcomp=servo.gravity)
+    for capsule in robot.capsules:
+        add(elements[capsule.joint], "geom", name=capsule.name, **_link(capsule),
+            contype="1", conaffinity="0")
     for number, obstacle in enumerate(obstacles, 1):  # which do not collide with each other
         if obstacle.shape != "point":
             body = add(world, "body", name=f"obstacle {number}", mocap="true",
@@ -108,25 +107,6 @@ def _stops(robot: Robot, q: Array) -> list[dict[str, ArrayLike]]:
             if np.isfinite(range_).any() else {} for range_ in ranges]
 
 
-def _arm(world: Element, robot: Robot, q: Array, joints: JointsSection,
-         servo: ServoSection) -> None:
-    elements, stops = [world], _stops(robot, q)
-    friction, damping, armature = (
-        each(getattr(joints, key), robot.n, f"plant.joints.{key}")
-        for key in ("friction", "damping", "armature"))
-    for i, body in enumerate(robot.bodies()):
-        elements.append(add_body(elements[body.parent], body, gravcomp=servo.gravity))
-        effort = robot.effort_limit[i]
-        efforts = {"actuatorfrclimited": "true", "actuatorfrcrange": (-effort, effort)
-                   } if np.isfinite(effort) else {}
-        add(elements[-1], "joint", name=body.name, type="hinge", axis=(0, 0, 1),
-            frictionloss=friction[i], damping=damping[i], armature=armature[i],
-            actuatorgravcomp="true", **stops[i], **efforts)
-    for capsule in robot.capsules:
-        add(elements[capsule.joint], "geom", name=capsule.name, **_link(capsule),
-            contype="1", conaffinity="0")
-
-
 def _link(capsule: Capsule) -> dict[str, Any]:
     """Return the shape of a link: a ball if it has no length."""
     if capsule.start == capsule.end:
@@ -147,7 +127,11 @@ def on_floor(robot: Robot, contacts: Contacts, floor: TorqueSection, timestep: f
     root, world = begin(robot, timestep, cone="elliptic", integrator="Euler", tolerance=1e-12,
                         iterations="200")
     add(world, "geom", type="plane", name="the floor", size=(20, 20, 1), pos=(0, 0, floor.height))
-    elements, pairs = _bodies(world, robot, floor, q), add(root, "contact")
+    friction, damping, armature = (of_drives(robot, key, getattr(floor, key)) for key in _DRIVE)
+    stops = _stops(robot, q) if floor.stops else [{}] * robot.n
+    drives = [{"damping": damping[v], "armature": robot.model.armature[v] + armature[v],
+               "frictionloss": friction[v]} | stop for v, stop in enumerate(stops)]
+    elements, pairs = _bodies(world, robot, drives, LEAST), add(root, "contact")
     for contact in contacts.contacts:
         touching = f"contact {contact.name}"
         add(elements[contact.frame.joint], "geom", name=touching, contype="0",
@@ -182,19 +166,26 @@ def _capsules(elements: list[Element], contact: Element, robot: Robot, q: Array)
             friction=(_SKIN, _SKIN, 0, 0, 0))
 
 
-def _bodies(world: Element, robot: Robot, floor: TorqueSection, q: Array) -> list[Element]:
-    of_joint, own, elements = _axes(robot), robot.model.armature, [world]
-    friction, damping, armature = (of_drives(robot, key, getattr(floor, key)) for key in _DRIVE)
-    stops = _stops(robot, q) if floor.stops else [{}] * robot.n
+def _bodies(world: Element, robot: Robot, drives: Sequence[dict[str, ArrayLike]],
+            least: tuple[float, float] = (0.0, 0.0), **values: ArrayLike) -> list[Element]:
+    """Add bodies "body NAME" and their joints to a world; return it and the bodies' elements.
+
+    drives : attributes of the joint of each velocity (n). least : at least a mass [kg] and moments
+    of inertia [kg m^2] more. values : of each body.
+    """
+    of_joint, elements = _axes(robot), [world]
     for i, body in enumerate(robot.bodies()):
-        element = add_body(elements[body.parent], body, LEAST)
+        element = add(elements[body.parent], "body", name=f"body {body.name}", pos=body.position,
+                      xyaxes=axes(body.rotation), **values)
         elements.append(element)
+        I = body.inertia + least[1] * np.eye(3)  # noqa: E741
+        add(element, "inertial", mass=max(body.mass, least[0]), pos=body.centre,
+            fullinertia=I[[0, 1, 2, 0, 0, 1], [0, 1, 2, 1, 2, 2]])
         if i == 0 and robot.base == "floating":
-            add(element, "joint", type="free", armature=own[0])
+            add(element, "joint", type="free", armature=robot.model.armature[0])
             continue
         kind, axis, v = of_joint[i + 1]
-        add(element, "joint", name=body.name, type=kind, axis=axis, damping=damping[v],
-            armature=own[v] + armature[v], frictionloss=friction[v], **stops[v])
+        add(element, "joint", name=body.name, type=kind, axis=axis, **drives[v])
     return elements
 
 

@@ -14,6 +14,7 @@ from hierarchy.problem import Array
 from hierarchy.robots import TABLES, DHTable
 from hierarchy.task import Level
 from scenarios.cell.plants.mjcf import Stops, each, scene
+from scenarios.cell.plants.plant import after
 from scenarios.config import ScenarioError
 from scenarios.config.sections.plant import JointsSection, PhysicsSection, ServoSection
 
@@ -154,24 +155,16 @@ def _follow(x, q, servo, reference):
     """Move the reference by one command, and interpolate it: `reference.steps` (steps, 2 n)."""
     T, lead, n, steps = servo.period, servo.lead, len(q), reference.steps.shape[0]
     for i in range(n):
-        rate = reference.v[i]
-        if servo.acceleration:
-            reference.a[i] = x[i]
-            after = rate + x[i] * T
-            step = rate * T + x[i] * T * T / 2
-        else:
-            reference.a[i] = (x[i] - rate) / T
-            after = x[i]
-            step = x[i] * T
+        reference.a[i], rate, step = after(x[i], T, servo.acceleration, reference.v[i])
         asked = reference.q[i] + step
         # A reference beyond a limit, where the arm started, may come back at its own pace.
         low, up = min(servo.lower[i], reference.q[i]), max(servo.upper[i], reference.q[i])
         allowed = min(max(asked, q[i] - lead, low), q[i] + lead, up)
         if allowed != asked:  # the reference is held, and its rate is what it still does
             step = allowed - reference.q[i]
-            after = step / T
+            rate = step / T
         for k in range(steps):
             reference.steps[k, i] = reference.q[i] + step * (k + 1) / steps
             reference.steps[k, n + i] = servo.feedforward * step / T
         reference.q[i] += step
-        reference.v[i] = after
+        reference.v[i] = rate

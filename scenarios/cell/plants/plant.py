@@ -11,7 +11,7 @@ from hierarchy import Robot, State
 from hierarchy.avoidance import Obstacles
 from hierarchy.contacts import Contacts
 from hierarchy.errors import brief, expect, finite_numbers, refuse
-from hierarchy.jit import compiled
+from hierarchy.jit import compiled, inlined
 from hierarchy.problem import Array
 from hierarchy.task import Level
 from hierarchy.tasks.joints.mechanism import Mechanism
@@ -191,12 +191,13 @@ def _check(plant: Any, what: str, robot: Robot) -> None:
 @compiled
 def _integrate(x, T, acceleration, v, a, step, q):
     for i in range(len(v)):
-        if acceleration:
-            a[i] = x[i]
-            step[i] = v[i] * T + x[i] * T * T / 2
-            v[i] += x[i] * T
-        else:
-            a[i] = (x[i] - v[i]) / T
-            step[i] = x[i] * T
-            v[i] = x[i]
+        a[i], v[i], step[i] = after(x[i], T, acceleration, v[i])
         q[i] += step[i]
+
+
+@inlined
+def after(x, T, acceleration, v):
+    """Acceleration, velocity in the end, and step of a joint of velocity v with a command x."""
+    if acceleration:
+        return x, v + x * T, v * T + x * T * T / 2
+    return (x - v) / T, x, x * T

@@ -57,8 +57,7 @@ def farthest(placements, joints, offsets, eye):
     """Return the depth [m] of the point that is farthest from the camera's plane."""
     most = 0.0
     for k in range(len(joints)):
-        x, y, z = place(placements[joints[k]], offsets[k])
-        most = max(most, in_camera(eye, x, y, z)[2])
+        most = max(most, in_camera(eye, place(placements[joints[k]], offsets[k]))[2])
     return most
 
 
@@ -134,7 +133,7 @@ def _nearest(space, image, mean, point, direction, pair):
     Writes the directions away from what is near and from the nearest into direction and pair.
     """
     eye = space.eye
-    c = in_camera(eye, point[0], point[1], point[2])
+    c = in_camera(eye, point)
     DD, at, nearest, total = _search(space, image, mean, c)
     if at < 0:
         direction[0] = direction[1] = direction[2] = 0.0
@@ -194,7 +193,6 @@ def _search(space, image, mean, c):
 @internal
 def _turn_unit_back(eye, vector, out):
     """Write the unit vector along one in the camera's frame into out (3,), in the world's."""
-    x, y, z = vector
-    length = sqrt(x * x + y * y + z * z)
+    length = sqrt(dot(vector, vector))
     for i in range(3):
-        out[i] = (eye[7 + 3 * i] * x + eye[8 + 3 * i] * y + eye[9 + 3 * i] * z) / length
+        out[i] = dot(eye[7 + 3 * i:], vector) / length

@@ -11,7 +11,7 @@ from math import ceil, floor, sqrt
 import numpy as np
 
 from hierarchy.jit import compiled, inlined, internal
-from hierarchy.kinematics import dot, place, turned
+from hierarchy.kinematics import dot, less, place, plus, times, turned
 
 _ALONG = 1e-12  # squared sine between ray and axis below which the side of a capsule is not met
 
@@ -29,10 +29,9 @@ def draw_scene(depth, eye, backdrop, obstacles, point_radius, placements, joints
         if row[1] > 0.0:
             _draw_box(depth, eye, row)
             continue
-        radius, half = row[0] if row[0] > 0.0 else point_radius, row[3]
-        x, y, z = in_camera(eye, row[4], row[5], row[6])
-        ax, ay, az = turned_into_camera(eye, half * row[9], half * row[12], half * row[15])
-        _draw_capsule(depth, eye, (x - ax, y - ay, z - az), (2 * ax, 2 * ay, 2 * az), radius)
+        radius, middle = row[0] if row[0] > 0.0 else point_radius, in_camera(eye, row[4:7])
+        half = turned_into_camera(eye, times(row[3], (row[9], row[12], row[15])))
+        _draw_capsule(depth, eye, less(middle, half), times(2.0, half), radius)
     _draw_robot(depth, eye, placements, joints, capsules, 0.0)
 
 
@@ -47,28 +46,23 @@ def draw_robot(depth, eye, placements, joints, capsules, margin):
 def _draw_robot(depth, eye, placements, joints, capsules, margin):
     for k in range(len(joints)):
         T, capsule = placements[joints[k]], capsules[k]
-        x, y, z = place(T, capsule)
-        ax, ay, az = turned(T, capsule[3:6])
-        _draw_capsule(depth, eye, in_camera(eye, x, y, z), turned_into_camera(eye, ax, ay, az),
-                      capsule[6] + margin)
+        _draw_capsule(depth, eye, in_camera(eye, place(T, capsule)),
+                      turned_into_camera(eye, turned(T, capsule[3:6])), capsule[6] + margin)
 
 
 @internal
 def _draw_capsule(depth, eye, start, along, radius):
     """Draw a capsule from its start along its axis, both in the camera's frame."""
-    (x, y, z), (ax, ay, az) = start, along
     height, width = depth.shape
-    u0, u1 = _pixels_of_capsule(eye[0], eye[2], width, x, z, ax, az, radius)
-    v0, v1 = _pixels_of_capsule(eye[1], eye[3], height, y, z, ay, az, radius)
-    aa, am = dot((ax, ay, az), (ax, ay, az)), dot((ax, ay, az), (x, y, z))
-    mm = dot((x, y, z), (x, y, z)) - radius * radius
-    bx, by, bz = x + ax, y + ay, z + az
-    nn = dot((bx, by, bz), (bx, by, bz)) - radius * radius
+    u0, u1 = _pixels_of_capsule(eye[0], eye[2], width, start, along, 0, radius)
+    v0, v1 = _pixels_of_capsule(eye[1], eye[3], height, start, along, 1, radius)
+    aa, am, end = dot(along, along), dot(along, start), plus(start, along)
+    mm, nn = dot(start, start) - radius * radius, dot(end, end) - radius * radius
     for v in range(v0, v1):
         ry = (v - eye[3]) / eye[1]
         for u in range(u0, u1):
-            rx = (u - eye[2]) / eye[0]
-            rr, ra, rm = rx * rx + ry * ry + 1.0, rx * ax + ry * ay + az, rx * x + ry * y + z
+            r = (u - eye[2]) / eye[0], ry, 1.0
+            rr, ra, rm = dot(r, r), dot(r, along), dot(r, start)
             A = aa * rr - ra * ra
             met = np.inf
             if A > _ALONG * aa * rr:  # the side: |(t r - m) x a| = radius |a|
@@ -80,7 +74,7 @@ def _draw_capsule(depth, eye, start, along, radius):
                 if 0.0 < t * ra - am < aa and t > 0.0:
                     met = t
             if met == np.inf:
-                met = min(_ball(rr, rm, mm), _ball(rr, rx * bx + ry * by + bz, nn))
+                met = min(_ball(rr, rm, mm), _ball(rr, dot(r, end), nn))
             if met < depth[v, u]:
                 depth[v, u] = met
 
@@ -95,35 +89,35 @@ def _ball(rr, rm, mm):
 
 
 @inlined
-def _pixels_of_capsule(f, c, size, x, z, ax, az, radius):
-    """First and end of its pixels along one axis of the image; see `pixels_of_ball`."""
-    if min(z, z + az) <= radius < max(z, z + az):  # it reaches past the camera
+def _pixels_of_capsule(f, c, size, start, along, i, radius):
+    """First and end of its pixels along axis i of the image; see `pixels_of_ball`."""
+    z, end_z = start[2], start[2] + along[2]
+    if min(z, end_z) <= radius < max(z, end_z):  # it reaches past the camera
         return 0, size
-    first, end = pixels_of_ball(f, c, size, x, z, radius)
-    other_first, other_end = pixels_of_ball(f, c, size, x + ax, z + az, radius)
+    first, end = pixels_of_ball(f, c, size, start[i], z, radius)
+    other_first, other_end = pixels_of_ball(f, c, size, start[i] + along[i], end_z, radius)
     return min(first, other_first), max(end, other_end)
 
 
 @internal
 def _draw_box(depth, eye, row):
     height, width = depth.shape
-    cx, cy, cz = in_camera(eye, row[4], row[5], row[6])
+    middle = in_camera(eye, row[4:7])
     around = sqrt(dot(row[1:4], row[1:4]))  # radius of the ball
-    u0, u1 = pixels_of_ball(eye[0], eye[2], width, cx, cz, around)
-    v0, v1 = pixels_of_ball(eye[1], eye[3], height, cy, cz, around)
-    ax, ay, az = turned_into_camera(eye, row[7], row[10], row[13])
-    bx, by, bz = turned_into_camera(eye, row[8], row[11], row[14])
-    dx, dy, dz = turned_into_camera(eye, row[9], row[12], row[15])
-    c = cx, cy, cz
-    a, b, d = dot((ax, ay, az), c), dot((bx, by, bz), c), dot((dx, dy, dz), c)
+    u0, u1 = pixels_of_ball(eye[0], eye[2], width, middle[0], middle[2], around)
+    v0, v1 = pixels_of_ball(eye[1], eye[3], height, middle[1], middle[2], around)
+    a = turned_into_camera(eye, (row[7], row[10], row[13]))
+    b = turned_into_camera(eye, (row[8], row[11], row[14]))
+    d = turned_into_camera(eye, (row[9], row[12], row[15]))
+    ca, cb, cd = dot(a, middle), dot(b, middle), dot(d, middle)
     ha, hb, hd = row[1], row[2], row[3]
     for v in range(v0, v1):
         ry = (v - eye[3]) / eye[1]
         for u in range(u0, u1):
-            rx = (u - eye[2]) / eye[0]
-            a0, a1 = _between_faces(rx * ax + ry * ay + az, a, ha)
-            b0, b1 = _between_faces(rx * bx + ry * by + bz, b, hb)
-            d0, d1 = _between_faces(rx * dx + ry * dy + dz, d, hd)
+            r = (u - eye[2]) / eye[0], ry, 1.0
+            a0, a1 = _between_faces(dot(r, a), ca, ha)
+            b0, b1 = _between_faces(dot(r, b), cb, hb)
+            d0, d1 = _between_faces(dot(r, d), cd, hd)
             enter, leave = max(a0, b0, d0), min(a1, b1, d1)
             if 0.0 < enter <= leave and enter < depth[v, u]:
                 depth[v, u] = enter
@@ -155,13 +149,12 @@ def pixels_of_ball(f, c, size, x, z, radius):
 
 
 @inlined
-def in_camera(eye, x, y, z):
+def in_camera(eye, p):
     """A world point in the camera's frame."""
-    return turned_into_camera(eye, x - eye[4], y - eye[5], z - eye[6])
+    return turned_into_camera(eye, less(p, eye[4:7]))
 
 
 @inlined
-def turned_into_camera(eye, x, y, z):
+def turned_into_camera(eye, a):
     """A world vector in the camera's frame."""
-    return (eye[7] * x + eye[10] * y + eye[13] * z, eye[8] * x + eye[11] * y + eye[14] * z,
-            eye[9] * x + eye[12] * y + eye[15] * z)
+    return dot(eye[7:16:3], a), dot(eye[8:16:3], a), dot(eye[9:16:3], a)

@@ -1,7 +1,7 @@
 """Common parts of sections: numbers with bounds and units, what says a kind, and the error."""
 
 import re
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from functools import partial
 from typing import Annotated, Any, ClassVar, Self, get_args
@@ -30,6 +30,12 @@ class Unit:
 
     name: str
     doubted: bool = True
+
+
+def shared(units: Iterable[str]) -> str:
+    """Return the unit that all of them are, "" where there are several."""
+    found = {*units}
+    return found.pop() if len(found) == 1 else ""
 
 
 # Strict: true is not 1.0, and "5" is not 5. A whole number may be given for a float.

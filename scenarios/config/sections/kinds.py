@@ -195,7 +195,7 @@ class ListedCoupling(base.Listed, base.TaskSection):
 
     def unit_among(self, joints: Mapping[str, str]) -> str:
         """Return the unit of the joints of the sum, "" where they have two."""
-        return base.shared(joints[name] for name in self.joints)
+        return keys.shared(joints[name] for name in self.joints)
 
 
 @register("tasks", "com", shipped=True)

@@ -39,12 +39,6 @@ def alike(names: Iterable[str]) -> Iterator[str]:
             yield f"{count} tasks are named {name!r}; give each its own name"
 
 
-def shared(units: Iterable[str]) -> str:
-    """Return the unit that all of them are, "" where there are several."""
-    found = {*units}
-    return found.pop() if len(found) == 1 else ""
-
-
 class Made(PartSection):
     """What every section of a task has: a title, and the task that it makes.
 
@@ -202,7 +196,7 @@ class PostureTask(TaskSection):
 
     def unit_among(self, joints: Mapping[str, str]) -> str:
         """Return the unit of all joints, "" where they have two."""
-        return shared(joints.values())
+        return keys.shared(joints.values())
 
     def asked(self, at: References) -> dict[str, Any]:
         """Return the posture, by default that of the start."""
