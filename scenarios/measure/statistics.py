@@ -16,18 +16,7 @@ LEVEL = 0.05     # probability of calling a difference real that is chance
 SAME = 1e-3      # relative difference below which two values count as the same, as below NOTHING
 FEWEST = 6       # pairs that differ; with fewer the signed-rank test cannot reach LEVEL
 EXACT = 50       # pairs that differ, up to which the test is exact
-
-
-@dataclass(frozen=True)
-class Spread:
-    """Number of known values, median, quartiles, least and largest."""
-
-    count: int
-    median: float
-    lower: float
-    upper: float
-    least: float
-    largest: float
+_SPREAD = {"median": 50.0, "lower": 25.0, "upper": 75.0, "least": 0.0, "largest": 100.0}
 
 
 @dataclass(frozen=True)
@@ -86,13 +75,13 @@ class Paired:
         return f"{', '.join(said)}, {probability(self.p)}"
 
 
-def spread(values: Array) -> Spread | None:
-    """Return the spread of the finite ones of values (N,); None if there is none."""
+def spread(values: Array) -> dict[str, float]:
+    """Return the number of finite values (N,), and percentiles of _SPREAD; {} if there is none."""
     known = values[np.isfinite(values)]
     if not known.size:
-        return None
-    least, lower, median, upper, largest = map(float, np.percentile(known, [0, 25, 50, 75, 100]))
-    return Spread(known.size, median, lower, upper, least, largest)
+        return {}
+    found = np.percentile(known, [*_SPREAD.values()]).tolist()
+    return {"count": known.size, **dict(zip(_SPREAD, found, strict=True))}
 
 
 def paired(first: Array, second: Array) -> Paired:

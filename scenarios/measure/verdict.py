@@ -2,7 +2,6 @@
 
 import dataclasses
 import math
-import shlex
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -193,11 +192,6 @@ class Comparison:
     def faults(self) -> list[Run]:
         """The runs that did not reach their end."""
         return [run for run in self.runs if run.fault]
-
-    def asked(self, *options: str) -> str:
-        """Return the command that compares the same, with further options."""
-        specs = ",".join(dict.fromkeys(run.spec for run in self.runs))
-        return shlex.join(["hierarchy", "compare", *self._names, "--resolvers", specs, *options])
 
     def groups(self) -> dict[str, list[Run]]:
         """Return the runs that stand side by side, with the name of each group.

@@ -16,7 +16,7 @@ from scenarios.measure import statistics
 from scenarios.measure.metric import NOTHING
 from scenarios.measure.metrics import Metric
 from scenarios.measure.runs import Cell, Row, by_name, grouped
-from scenarios.measure.statistics import Paired, Spread, paired, wilson
+from scenarios.measure.statistics import Paired, paired, wilson
 from scenarios.results.plan import Job, Outcome, Plan
 
 # What is weighed in the verdict.
@@ -101,10 +101,6 @@ class Results:
         for i in np.flatnonzero(self._of[label]):
             found[self.runs[i].sample] = values[i]
         return found
-
-    def spread(self, name: str, label: str) -> Spread | None:
-        """Return the spread of a metric under a resolver; None if it has no value."""
-        return statistics.spread(self.column(name, label))
 
     def paired(self, name: str, label: str) -> Paired:
         """Return the paired differences of a metric from the first column."""
@@ -220,11 +216,10 @@ def rows(results: Results) -> list[Row]:
 
 def _summary(results: Results, metric: Metric, label: str) -> str:
     """Return "median [lower quartile, upper quartile]" of a metric under a resolver."""
-    found = results.spread(metric.name, label)
-    if found is None:
+    found = statistics.spread(results.column(metric.name, label))
+    if not found:
         return "–"
-    median, low, high = (valued(metric, value).shown()
-                         for value in (found.median, found.lower, found.upper))
+    median, low, high = (valued(metric, found[key]).shown() for key in ("median", "lower", "upper"))
     return median if low == high else f"{median} [{low}, {high}]"
 
 

@@ -1,6 +1,7 @@
 """Run scenarios under several resolvers, write the runs and report the comparison."""
 
 import dataclasses
+import shlex
 import time
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import suppress
@@ -56,8 +57,10 @@ def compare(scenarios: Iterable[str | Scenario] | str | Scenario,
     whole("compare: workers", workers, 1)
     planned, refused = _plan(scenarios, resolvers)
     folder = None if out is None else files.make_folder(files.claim(file_path("compare: out", out)))
-    where = [] if out is None else ["--out", str(out)]
-    said = command or Comparison(tuple(planned), "", {}).asked(*where)
+    names = dict.fromkeys(run.scenario.name for run in planned)
+    specs = ",".join(dict.fromkeys(run.spec for run in planned))
+    said = command or shlex.join(["hierarchy", "compare", *names, "--resolvers", specs,
+                                  *([] if out is None else ["--out", str(out)])])
     empty = Comparison((), said, versions(), refused, None if out is None else str(out))
     written, told = _Written(folder, empty, len(planned)), progress or (lambda *_: None)
     make = _together if min(workers, len(planned)) > 1 else _one_by_one
