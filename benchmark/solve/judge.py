@@ -15,6 +15,7 @@ from benchmark.process import CRASHED, HUNG, SLOW
 from benchmark.report import Row
 from benchmark.timing import times_of
 from hierarchy.problem import Array, Hierarchy
+from hierarchy.words import gathered
 from solvers.certificate import certify
 from solvers.problems.files import Collection
 from solvers.proof import Proof
@@ -164,10 +165,7 @@ def summary(rows: Sequence[Row], steps: Mapping[str, float] | None = None) -> Ro
 
 def by(rows: Iterable[Row], key: str) -> list[tuple[str, list[Row]]]:
     """Return the rows in groups, in the order in which they first occur."""
-    groups: dict[str, list[Row]] = {}
-    for row in rows:
-        groups.setdefault(row[key], []).append(row)
-    return list(groups.items())
+    return list(gathered((row[key], row) for row in rows).items())
 
 
 def summaries(rows: Sequence[Row], steps: Mapping[str, float] | None = None) -> list[Row]:

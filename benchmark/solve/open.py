@@ -17,7 +17,7 @@ from benchmark.solve import views
 from benchmark.solve.entrants import ABSENT, ENTRANTS
 from benchmark.solve.judge import ENDED, RAISED, by, cells, judge, miss_of
 from hierarchy.errors import refuse
-from hierarchy.problem import Array
+from hierarchy.words import gathered
 from scenarios.files import make_folder, named, slug, write_json, written
 from scenarios.problems.families import FAMILIES, Family, export, file_of, save
 from scenarios.results.store import StoreError
@@ -138,10 +138,8 @@ def prove_at_borders(folder: Path) -> None:
 
     The border decides which rows are dependent, and so which problems are well posed.
     """
-    xs: dict[tuple[str, int], list[Array]] = {}
-    for row in _rows(folder):
-        if row.get("solved"):
-            xs.setdefault((row["sha256"], row["problem"]), []).append(np.array(row["x"]))
+    xs = gathered(((row["sha256"], row["problem"]), np.array(row["x"]))
+                  for row in _rows(folder) if row.get("solved"))
     for border, file in product(BORDERS, sorted((folder / "problems").glob("[!.]*.npz"))):
         out = folder / "borders" / f"{border:g}"
         if not (out / file.name).is_file():

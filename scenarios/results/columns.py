@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from hierarchy.words import listed
+from hierarchy.words import gathered, listed
 from scenarios.measure import statistics
 from scenarios.measure.metric import NOTHING
 from scenarios.measure.metrics import Metric
@@ -31,6 +31,7 @@ _BROKEN: dict[str, dict[str, tuple[Callable[..., NDArray[np.bool_]], float]]] = 
     "Every tick solved": {"ticks_not_solved": (np.greater, 0.0)},
     "Kept the distance asked for": {"body_below_share": (np.greater, 0.0),
                                     "ee_below_share": (np.greater, 0.0)}}
+_NUMBER = re.compile(r"\d+(\.\d+)?(e[+-]?\d+)?")
 
 
 class Share(NamedTuple):
@@ -173,11 +174,8 @@ class Results:
 
     def failures(self) -> list[Failure]:
         """Return why runs failed; reasons that differ only in numbers are merged by resolver."""
-        found: dict[tuple[str, str], list[tuple[str, Job]]] = {}
-        for run, reason in zip(self.runs, self.reasons, strict=True):
-            if reason is not None:
-                kind = run.label, re.sub(r"\d+(\.\d+)?(e[+-]?\d+)?", "#", reason)
-                found.setdefault(kind, []).append((reason, run))
+        found = gathered(((run.label, _NUMBER.sub("#", reason)), (reason, run)) for run, reason in
+                         zip(self.runs, self.reasons, strict=True) if reason is not None)
         return sorted((Failure(*of[0], len(of)) for of in found.values()),
                       key=lambda one: -one.count)
 
@@ -229,11 +227,8 @@ def results(plan: Plan, kept: Mapping[str, Outcome]) -> dict[str, Results]:
     A group is a scenario; with one resolver and several scenarios there is one group, named after
     the resolver, whose columns are the scenarios.
     """
-    groups: dict[str, list[Job]] = {}
-    for run in plan.runs:
-        groups.setdefault(run.group, []).append(run)
     found = {}
-    for name, runs in groups.items():
+    for name, runs in gathered((run.group, run) for run in plan.runs).items():
         each = [{one.name: one for one in kept[run.key].metrics if one.value is not None}
                 for run in runs]
         metrics = by_name(each)
