@@ -84,11 +84,11 @@ terminal.bar = lambda *_: contextlib.nullcontext(
 @pytest.mark.parametrize(("page", "workers"), [("whole", 2), ("broken", 1)])
 def test_an_interrupted_comparison_keeps_what_ended_and_names_the_folder(
         page, workers, tmp_path, monkeypatch, command, undrawn):
-    def add_and_interrupt(written, i, run, add=comparing._Written.add):
-        add(written, i, run)
+    def write_and_interrupt(*given, write=comparing._so_far):
+        write(*given)
         raise KeyboardInterrupt
 
-    monkeypatch.setattr(comparing._Written, "add", add_and_interrupt)
+    monkeypatch.setattr(comparing, "_so_far", write_and_interrupt)
     if page == "broken":
         monkeypatch.setattr("scenarios.results.page.comparison_page",
                             mock.Mock(side_effect=ArithmeticError))
