@@ -16,7 +16,6 @@ LEVEL = 0.05     # probability of calling a difference real that is chance
 SAME = 1e-3      # relative difference below which two values count as the same, as below NOTHING
 FEWEST = 6       # pairs that differ; with fewer the signed-rank test cannot reach LEVEL
 EXACT = 50       # pairs that differ, up to which the test is exact
-_SPREAD = {"median": 50.0, "lower": 25.0, "upper": 75.0, "least": 0.0, "largest": 100.0}
 
 
 @dataclass(frozen=True)
@@ -76,12 +75,13 @@ class Paired:
 
 
 def spread(values: Array) -> dict[str, float]:
-    """Return the number of finite values (N,), and percentiles of _SPREAD; {} if there is none."""
+    """Return number, median, quartiles, least and largest of finite values (N,); {} if none is."""
     known = values[np.isfinite(values)]
     if not known.size:
         return {}
-    found = np.percentile(known, [*_SPREAD.values()]).tolist()
-    return {"count": known.size, **dict(zip(_SPREAD, found, strict=True))}
+    names = "median", "lower", "upper", "least", "largest"
+    found = np.percentile(known, [50, 25, 75, 0, 100]).tolist()
+    return {"count": known.size, **dict(zip(names, found, strict=True))}
 
 
 def paired(first: Array, second: Array) -> Paired:
