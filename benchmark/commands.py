@@ -210,11 +210,10 @@ def open_(context: typer.Context, family: Family = None,
     for left, why in ({} if family else unavailable()).items():
         tell(f"left out: {left}, which {why}")
     counts = {0: public or count, **dict.fromkeys(fresh or [1], count)}
-    store = opened.run(out, [named(one) for one in family or ()] or available(), table, counts,
-                       limit)
+    opened.run(out, [named(one) for one in family or ()] or available(), table, counts, limit)
     if borders:
-        opened.prove_at_borders(store)
-    found = opened.report(store)
+        opened.prove_at_borders(out)
+    found = opened.report(out)
     found.say()
     found.write(out)
     print(f"\nPage: {shown(out / 'index.html')}")

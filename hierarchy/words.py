@@ -1,8 +1,20 @@
-"""Names and numbers as they stand in a sentence."""
+"""Names and numbers as they stand in a sentence, and things by name."""
 
-from collections.abc import Sequence
+from collections.abc import Hashable, Iterable, Sequence
+from typing import TypeVar
+
+_Key = TypeVar("_Key", bound=Hashable)
+_Thing = TypeVar("_Thing")
 
 _NUMBERS = ("no", "one", "two", "three", "four", "five", "six", "seven", "eight", "nine", "ten")
+
+
+def gathered(pairs: Iterable[tuple[_Key, _Thing]]) -> dict[_Key, list[_Thing]]:
+    """Return the things of each key, in the order in which they come."""
+    found: dict[_Key, list[_Thing]] = {}
+    for key, thing in pairs:
+        found.setdefault(key, []).append(thing)
+    return found
 
 
 def listed(names: Sequence[str], last_by: str = "and") -> str:

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from hierarchy.errors import HierarchyError, brief, expect, number
+from hierarchy.errors import HierarchyError, brief, expect, number, refuse
 from hierarchy.gate import shaped
 from hierarchy.problem import Array, Hierarchy
 from hierarchy.words import listed
@@ -40,10 +40,9 @@ def explain(h: Hierarchy, resolution: Resolution, tolerance: float = 1e-9,
     names = [f"row {i}" for size in h.sizes for i in range(size)] if rows is None else rows
     units = [""] * h.m if units is None else units
     for what, called, given in (("rows", "names", names), ("units", "units", units)):
-        if isinstance(given, str) or not isinstance(given, Sequence):
-            raise HierarchyError(f"explain: {what}: expected a list of names, got {brief(given)}")
-        if len(given) != h.m:
-            raise HierarchyError(f"explain: {len(given)} {called} for {h.m} rows")
+        refuse(isinstance(given, str) or not isinstance(given, Sequence),
+               f"explain: {what}: expected a list of names, got {brief(given)}")
+        refuse(len(given) != h.m, f"explain: {len(given)} {called} for {h.m} rows")
     if not isinstance(resolution, ActiveSetResolution):
         raise HierarchyError("explain needs a resolution of hcod: other resolvers do not report "
                              "which level each row holds back")
@@ -89,14 +88,12 @@ def _level(h: Hierarchy, resolution: ActiveSetResolution, k: int, tolerance: flo
     if not is_missed(h, resolution.x, k, tolerance):
         return f"{h.names[k]} is met."
     missed = float(np.linalg.norm(h.slacks(resolution.x)[rows]))
-    blocking, at = held_back_by(h, resolution, k, names), ""
-    if named and (most := most_missed(h, resolution.x, k, names)):
-        at = f", at {listed(most)}"
-    if not blocking:
-        why = nowhere(h, k, names[rows], resolution.x) or "its own rows disagree"
-        return f"{h.names[k]} is missed by {missed:.3g}{at}: {why}."
-    by = listed(_said_once(blocking, h.names))
-    return f"{h.names[k]} is missed by {missed:.3g}{at}: held back by {by}."
+    blocking = held_back_by(h, resolution, k, names)
+    most = most_missed(h, resolution.x, k, names) if named else []
+    at = f", at {listed(most)}" if most else ""
+    why = (f"held back by {listed(_said_once(blocking, h.names))}" if blocking else
+           nowhere(h, k, names[rows], resolution.x) or "its own rows disagree")
+    return f"{h.names[k]} is missed by {missed:.3g}{at}: {why}."
 
 
 def _giving(h: Hierarchy, resolution: ActiveSetResolution, k: int, witness: Array,

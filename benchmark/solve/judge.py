@@ -15,6 +15,7 @@ from benchmark.process import CRASHED, HUNG, SLOW
 from benchmark.report import Row
 from benchmark.timing import times_of
 from hierarchy.problem import Array, Hierarchy
+from hierarchy.words import gathered
 from solvers.certificate import certify
 from solvers.problems.files import Collection
 from solvers.proof import Proof
@@ -149,14 +150,14 @@ def summary(rows: Sequence[Row], steps: Mapping[str, float] | None = None) -> Ro
         "wrong": counts[WRONG], "modest": counts[MODEST], "failed": counts[FAILED],
         "ended": sum(counts[verdict] for verdict in ENDED), "answered": len(claimed),
         "slow": sum(row.get("refused") == SLOW for row in rows),
-        **{key: _over(np.max, (row[key] for row in claimed))
+        **{key: over(np.max, (row[key] for row in claimed))
            for key in ("absolute", "relative", "moved")},
-        "iterations": _over(np.median, (row.get("iterations") for row in rows)),
-        "warm_iterations": _over(np.median, (row.get("warm_iterations") for row in rows)),
-        "warm_right": _over(np.mean, (row["warm_right"] for row in rows)),
+        "iterations": over(np.median, (row.get("iterations") for row in rows)),
+        "warm_iterations": over(np.median, (row.get("warm_iterations") for row in rows)),
+        "warm_right": over(np.mean, (row["warm_right"] for row in rows)),
         "same": all(row.get("same") is not False for row in rows),
-        "memory_mb": _over(np.max, (row["memory"] for row in rows)) / 1024,
-        "rough": _over(np.max, rough)}
+        "memory_mb": over(np.max, (row["memory"] for row in rows)) / 1024,
+        "rough": over(np.max, rough)}
     for key, prefix in _TIMES.items():
         found |= times_of([time for row in rows for time in row.get(f"{key}_ns") or ()], prefix)
     return found
@@ -164,10 +165,7 @@ def summary(rows: Sequence[Row], steps: Mapping[str, float] | None = None) -> Ro
 
 def by(rows: Iterable[Row], key: str) -> list[tuple[str, list[Row]]]:
     """Return the rows in groups, in the order in which they first occur."""
-    groups: dict[str, list[Row]] = {}
-    for row in rows:
-        groups.setdefault(row[key], []).append(row)
-    return list(groups.items())
+    return list(gathered((row[key], row) for row in rows).items())
 
 
 def summaries(rows: Sequence[Row], steps: Mapping[str, float] | None = None) -> list[Row]:
@@ -227,6 +225,7 @@ def _shares(values: Sequence[float], most: Array) -> Array:
     return np.asarray(np.mean(np.array(values)[:, None] <= most, axis=0))
 
 
-def _over(reduce: Callable[..., Any], values: Iterable[float | None]) -> float:
+def over(reduce: Callable[..., Any], values: Iterable[float | None]) -> float:
+    """Return what is made of the values that are known, NaN of none."""
     known = [value for value in values if value is not None and not np.isnan(value)]
     return float(reduce(known)) if known else np.nan

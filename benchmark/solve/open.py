@@ -3,11 +3,10 @@
 import gzip
 import json
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from itertools import product
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import final
 
 import numpy as np
 
@@ -18,7 +17,7 @@ from benchmark.solve import views
 from benchmark.solve.entrants import ABSENT, ENTRANTS
 from benchmark.solve.judge import ENDED, RAISED, by, cells, judge, miss_of
 from hierarchy.errors import refuse
-from hierarchy.problem import Array
+from hierarchy.words import gathered
 from scenarios.files import make_folder, named, slug, write_json, written
 from scenarios.problems.families import FAMILIES, Family, export, file_of, save
 from scenarios.results.store import StoreError
@@ -36,91 +35,75 @@ _ALIKE = 7   # digits of x / (1 + |x|) in which candidates for a proof count as 
 _BREAKS = {RAISED: "raises", CRASHED: "ends its process", HUNG: "takes longer than --limit"}
 
 
-@final
-@dataclass(frozen=True)
-class Store:
-    """The folder of a benchmark: `problems/`, `rows/`, and what is known of the entrants."""
-
-    folder: Path
-
-    @property
-    def problems(self) -> Path:
-        """The folder of the files of problems."""
-        return self.folder / "problems"
-
-    def file_of(self, entrant: str, problems: Path) -> Path:
-        """Return where the rows of an entrant on a file of problems belong."""
-        return self.folder / "rows" / f"{slug(entrant)}--{problems.stem}.jsonl.gz"
-
-    def add(self, rows: Iterable[Row], file: Path) -> None:
-        """Write the rows of one entrant on one file of problems, whole or not; see OutputError."""
-        make_folder(file.parent)
-        with named(file), written(file) as partial, gzip.open(partial, "wt") as lines:
-            lines.writelines(json.dumps(row) + "\n" for row in rows)
-
-    def rows(self) -> list[Row]:
-        """Return all rows; raises StoreError for a file that is damaged."""
-        return [row for file in sorted((self.folder / "rows").glob("[!.]*.jsonl.gz"))
-                for row in _read(file)]
-
-    def notes(self, name: str) -> dict[str, str]:
-        """Return what NAME.json says, {} if there is none yet."""
-        file = self.folder / f"{name}.json"
-        found: dict[str, str] = json.loads(file.read_text("utf-8")) if file.is_file() else {}
-        return found
-
-    def note(self, name: str, content: dict[str, str]) -> None:
-        """Write NAME.json."""
-        make_folder(self.folder)
-        write_json(self.folder / f"{name}.json", content)
+def _rows_of(entrant: str, file: Path) -> Path:
+    """Return where the rows of an entrant on a file of problems belong."""
+    return file.parents[1] / "rows" / f"{slug(entrant)}--{file.stem}.jsonl.gz"
 
 
-def _read(file: Path) -> list[Row]:
-    try:
-        with gzip.open(file, "rt") as lines:
-            return [json.loads(line) for line in lines]
-    except (OSError, EOFError, ValueError) as error:
-        raise StoreError(f"{file} cannot be read ({error}); remove it to run its entrant again"
-                         ) from error
+def _rows(folder: Path) -> list[Row]:
+    """Return all rows of a benchmark; raises StoreError for a file that is damaged."""
+    rows = list[Row]()
+    for file in sorted((folder / "rows").glob("[!.]*.jsonl.gz")):
+        try:
+            with gzip.open(file, "rt") as lines:
+                rows += map(json.loads, lines)
+        except (OSError, EOFError, ValueError) as error:
+            raise StoreError(f"{file} cannot be read ({error}); remove it to run its entrant again"
+                             ) from error
+    return rows
+
+
+def _notes(folder: Path, name: str) -> dict[str, str]:
+    """Return what NAME.json says, {} if there is none yet."""
+    file = folder / f"{name}.json"
+    found: dict[str, str] = json.loads(file.read_text("utf-8")) if file.is_file() else {}
+    return found
+
+
+def _write(rows: Iterable[Row], file: Path) -> None:
+    """Write the rows of one entrant on one file of problems, whole or not; see OutputError."""
+    make_folder(file.parent)
+    with named(file), written(file) as partial, gzip.open(partial, "wt") as lines:
+        lines.writelines(json.dumps(row) + "\n" for row in rows)
 
 
 def run(folder: Path, families: Sequence[Family], entrants: Sequence[Entrant],
-        counts: Mapping[int, int | None], limit: float = LIMIT) -> Store:
+        counts: Mapping[int, int | None], limit: float = LIMIT) -> None:
     """Write the problems, let all entrants take turns with each, and keep the raw rows.
 
-    What is in the folder already stays as it is: an interrupted benchmark goes on, and an entrant
-    that is added later meets the same problems. What entrants find goes to the prover where no
-    proof is complete.
+    The folder gets `problems/`, `rows/`, and what is known of the entrants. What is there already
+    stays as it is: an interrupted benchmark goes on, and an entrant that is added later meets the
+    same problems. What entrants find goes to the prover where no proof is complete.
 
     counts : problems of each set, by its seed, None for the usual number; 0 is the public set.
     limit : [s] for one problem.
     """
-    store, left = Store(folder), dict[Path, list[str]]()
-    refuse(folder.is_dir() and not store.problems.is_dir() and any(folder.iterdir()),
+    problems, left = folder / "problems", dict[Path, list[str]]()
+    refuse(folder.is_dir() and not problems.is_dir() and any(folder.iterdir()),
            f"output folder {folder} is not empty and is no benchmark's; choose another, or remove "
            "it first")
     for family, (seed, count) in product(families, counts.items()):
-        file = file_of(store.problems, family.name, seed)
+        file = file_of(problems, family.name, seed)
         if not file.is_file():
             tell(f"{family.name}, seed {seed}: problems and their proofs")
-            export(family, seed, count, True, store.problems)
+            export(family, seed, count, True, problems)
         elif count not in (None, there := len(read(file).problems)):
             tell(f"{file.stem} has {there} problems, not {count}: they stay as they are")
-        left[file] = [one.label for one in entrants if not store.file_of(one.label, file).is_file()]
-    store.note("limits", store.notes("limits") | {one.label: one.limits for one in entrants})
+        left[file] = [one.label for one in entrants if not _rows_of(one.label, file).is_file()]
+    write_json(make_folder(folder) / "limits.json", _notes(folder, "limits") | {
+        one.label: one.limits for one in entrants})
     with Field([one for one in entrants if any(one.label in some for some in left.values())],
                QUESTIONS) as field:
-        missing = {label: why for label, why in store.notes("missing").items()
+        missing = {label: why for label, why in _notes(folder, "missing").items()
                    if all(one.label != label for one in entrants)}
-        store.note("missing", missing | field.missing)
+        write_json(folder / "missing.json", missing | field.missing)
         for file, labels in left.items():
             if some := [label for label in labels if label in field.running]:
                 tell(f"{file.stem}: {len(some)} entrants")
                 found = asked(field, file, limit, some)
                 for label, rows in found.items():
-                    store.add(rows, store.file_of(label, file))
+                    _write(rows, _rows_of(label, file))
                 improve(file, found.values())
-    return store
 
 
 def asked(field: Field, file: Path, limit: float = LIMIT, labels: Sequence[str] | None = None
@@ -150,37 +133,35 @@ def improve(file: Path, found: Iterable[list[Row]]) -> None:
         save(replace(one, answers=tuple(proofs)), file.parent)
 
 
-def prove_at_borders(store: Store) -> None:
+def prove_at_borders(folder: Path) -> None:
     """Prove the answers of a folder at each of BORDERS, into `borders/`, from those of entrants.
 
     The border decides which rows are dependent, and so which problems are well posed.
     """
-    xs: dict[tuple[str, int], list[Array]] = {}
-    for row in store.rows():
-        if row.get("solved"):
-            xs.setdefault((row["sha256"], row["problem"]), []).append(np.array(row["x"]))
-    for border, file in product(BORDERS, sorted(store.problems.glob("[!.]*.npz"))):
-        folder = store.folder / "borders" / f"{border:g}"
-        if not (folder / file.name).is_file():
+    xs = gathered(((row["sha256"], row["problem"]), np.array(row["x"]))
+                  for row in _rows(folder) if row.get("solved"))
+    for border, file in product(BORDERS, sorted((folder / "problems").glob("[!.]*.npz"))):
+        out = folder / "borders" / f"{border:g}"
+        if not (out / file.name).is_file():
             one = read(file)
             save(replace(one, answers=tuple(
                 prove(h, xs.get((one.digest, p), []), border)
-                for p, h in enumerate(one.problems))), folder)
+                for p, h in enumerate(one.problems))), out)
 
 
-def report(store: Store) -> Report:
+def report(folder: Path) -> Report:
     """Return what a folder has, judged anew; raises HierarchyError if it has no rows.
 
     Each set has a section, fresh ones first; no number is of two sets together.
     """
     order, labels = [*FAMILIES], [one.label for one in ENTRANTS]
-    raw = sorted(store.rows(), key=lambda row: (_place(order, row["family"]),
+    raw = sorted(_rows(folder), key=lambda row: (_place(order, row["family"]),
                                                 _place(labels, row["entrant"])))
-    found = _problems(store.problems)
+    found = _problems(folder / "problems")
     rows = judge(raw, {one.digest: one for one in found})
-    at = {float(folder.name): judge(raw, {one.digest: one for one in _problems(folder)})
-          for folder in (store.folder / "borders").glob("[!.]*")}
-    refuse(not rows, f"{store.folder} has no rows of a benchmark: run `hierarchy bench "
+    at = {float(border.name): judge(raw, {one.digest: one for one in _problems(border)})
+          for border in (folder / "borders").glob("[!.]*")}
+    refuse(not rows, f"{folder} has no rows of a benchmark: run `hierarchy bench "
            "open` first")
     sections, kept = [], list[Row]()
     for seed in sorted({row["seed"] for row in rows}, key=lambda seed: (seed == 0, seed)):
@@ -192,9 +173,9 @@ def report(store: Store) -> Report:
         sections.append(section)
         kept += [{"half": title, **row} for row in some]
     versions = {row["entrant"]: row["version"] for row in rows}
-    return Report("The open benchmark of prioritized control",
-                  [*sections, views.entrants(versions, store.notes("limits"))], {"summary": kept},
-                  store.notes("missing") | ABSENT)
+    return Report("The open benchmark of prioritized control", [
+        *sections, views.entrants(versions, _notes(folder, "limits"))], {"summary": kept},
+        _notes(folder, "missing") | ABSENT)
 
 
 def _problems(folder: Path) -> list[Collection]:

@@ -7,14 +7,15 @@ kept in `out`: the same command continues, and folders of several machines can b
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated
 
 import numpy as np
 import typer
 
-from benchmark.report import Column, Report, Section, Table, power, whole
+from benchmark.report import Column, Report, Row, Section, Table, power, whole
+from benchmark.solve.judge import over
+from hierarchy.problem import Array
 from scenarios.config import load
 from scenarios.results.columns import Results
 from scenarios.results.sampled import Workers, compare_starts
@@ -57,32 +58,25 @@ def main(starts: int = 16, seed: int = 14, scenarios: str = SCENARIOS, resolvers
     Report("Commands from tick to tick", [Section("", tables, _WORDS)]).say()
 
 
-def _row(results: Results, label: str, step: str) -> dict[str, Any]:
+def _row(results: Results, label: str, step: str) -> Row:
     """Return what is shown of a resolver; runs that fall count only as such."""
-    ended = np.array([reason is None for run, reason in zip(
-        results.runs, results.reasons, strict=True) if run.label == label])
-
-    def of(*metrics: str) -> np.ndarray:
-        """Return the first of these metrics that is known."""
+    def of(*metrics: str) -> Array:
+        """Return the first of these metrics that is known, NaN of runs that fall."""
         known = [name for name in metrics if name in results.values]
-        return results.column(known[0], label)[ended] if known else np.array([])
+        return results.compared(known[0], label) if known else np.empty(0)
 
     hands = [of(f"miss_{side}_hand") for side in ("left", "right")]
-    return {"entrant": label.split()[0], "stood": f"{ended.sum()} of {len(ended)}",
-            "step": _over(np.median, of(f"{step}_max")),
-            "largest": _over(np.max, of(f"{step}_max")),
-            "above": _over(np.sum, of(f"{step}_ticks")),
-            "limits": _over(np.max, of("miss_limits")),
-            "excess": _over(np.max, of("joint_limit_excess")),
-            "com": _over(np.median, of("miss_centre_of_mass")),
-            "hand": _over(np.median, np.maximum(*hands)),
-            "end": 1e3 * _over(np.median, of("task_centre_of_mass_end",
-                                             "position_error_median_settled")),
-            "time": _over(np.median, of("time_resolve_median"))}
-
-
-def _over(reduce: Callable[[np.ndarray], float], values: np.ndarray) -> float:
-    return float(reduce(values)) if len(values) else float("nan")
+    return {"entrant": label.split()[0], "stood": str(results.shares()["Reached the end"][label]),
+            "step": over(np.median, of(f"{step}_max")),
+            "largest": over(np.max, of(f"{step}_max")),
+            "above": over(np.sum, of(f"{step}_ticks")),
+            "limits": over(np.max, of("miss_limits")),
+            "excess": over(np.max, of("joint_limit_excess")),
+            "com": over(np.median, of("miss_centre_of_mass")),
+            "hand": over(np.median, np.maximum(*hands)),
+            "end": 1e3 * over(np.median, of("task_centre_of_mass_end",
+                                            "position_error_median_settled")),
+            "time": over(np.median, of("time_resolve_median"))}
 
 
 if __name__ == "__main__":

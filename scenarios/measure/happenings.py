@@ -27,7 +27,6 @@ _LARGEST = 3       # jumps
 _LOOKED_AT = 20   # ticks of a level, spread over those in which it was missed
 _LEAST = 0.01     # share of a level's ticks: what is given up for less is not said
 _OFTEN = 0.25     # share of the ticks looked at: what holds back less often is not said
-_PER = {"acceleration": "/s^2", "velocity": "/s"}
 
 Shares = tuple[tuple[str, float], ...]
 
@@ -55,22 +54,20 @@ def jumps(recording: Recording, tick: int | None = None, least: float = 0.0) -> 
     """
     refuse(tick is not None and not 0 < whole("tick", tick) < recording.ticks, f"tick {tick}: the "
            f"run has ticks 0 to {recording.ticks - 1}, and a change needs the one before")
-    step = np.nan_to_num(np.abs(np.diff(recording["command"], axis=0))).max(axis=1, initial=0.0)
-    ticks = [k + 1 for k in np.argsort(-step, kind="stable")[:_LARGEST] if step[k] > least]
+    steps = np.nan_to_num(np.abs(np.diff(recording["command"], axis=0)))
+    size = steps.max(axis=1, initial=0.0)
+    ticks = [k + 1 for k in np.argsort(-size, kind="stable")[:_LARGEST] if size[k] > least]
     if not ticks and tick is None:
         return []
     cell = build(recording.scenario)
     rows = Rows(recording, cell)
     solves = _solves(recording, cell, rows, list(map(int, ticks)) if tick is None else [tick])
-    level, found = recording.scenario.control.level, []
+    level, units, found = recording.scenario.control.level, recording.units()["command"], []
     for k, solve in solves.items():
-        change = np.nan_to_num(np.abs(recording["command"][k] - recording["command"][k - 1]))
-        i = int(change.argmax())
-        joint, of = cell.robot.n - len(change) + i, recording.facts.robot
-        unit = (of.effort_units[joint] if level == "torque" else
-                of.velocity_units[joint] + _PER[level])
-        found.append(Jump(k, float(recording["t"][k]), f"{level} of {of.velocity_names[joint]}",
-                          float(change[i]), unit, tuple(_causes(recording, cell, rows, k, solve))))
+        step, i = steps[k - 1], int(steps[k - 1].argmax())
+        joint = recording.facts.robot.velocity_names[i - len(step)]  # the last are actuated
+        found.append(Jump(k, float(recording["t"][k]), f"{level} of {joint}", float(step[i]),
+                          units[i], tuple(_causes(recording, cell, rows, k, solve))))
     return found
 
 

@@ -5,6 +5,7 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any, NamedTuple
 
+from hierarchy.words import gathered
 from scenarios.config import Scenario
 from scenarios.config.scenario import OWN
 from scenarios.files import slug
@@ -156,10 +157,7 @@ def grouped(rows: Sequence[Row]) -> list[Row]:
 def flags(runs: Sequence[Run]) -> list[str]:
     """Return the `caveats` about the resolvers of runs, each once, with the columns it is about."""
     found = caveats({run.label: run.recording.facts.resolver for run in runs if run.recording})
-    columns: dict[str, list[str]] = {}
-    for label, said in found.items():
-        for caveat in said:
-            columns.setdefault(caveat, []).append(label)
+    columns = gathered((caveat, label) for label, said in found.items() for caveat in said)
     return [f"{', '.join(labels)}: {caveat}" for caveat, labels in columns.items()]
 
 

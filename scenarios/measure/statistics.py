@@ -19,18 +19,6 @@ EXACT = 50       # pairs that differ, up to which the test is exact
 
 
 @dataclass(frozen=True)
-class Spread:
-    """Number of known values, median, quartiles, least and largest."""
-
-    count: int
-    median: float
-    lower: float
-    upper: float
-    least: float
-    largest: float
-
-
-@dataclass(frozen=True)
 class Paired:
     """The differences of one quantity between two runs on the same samples: second minus first.
 
@@ -86,13 +74,14 @@ class Paired:
         return f"{', '.join(said)}, {probability(self.p)}"
 
 
-def spread(values: Array) -> Spread | None:
-    """Return the spread of the finite ones of values (N,); None if there is none."""
+def spread(values: Array) -> dict[str, float]:
+    """Return number, median, quartiles, least and largest of finite values (N,); {} if none is."""
     known = values[np.isfinite(values)]
     if not known.size:
-        return None
-    least, lower, median, upper, largest = map(float, np.percentile(known, [0, 25, 50, 75, 100]))
-    return Spread(known.size, median, lower, upper, least, largest)
+        return {}
+    names = "median", "lower", "upper", "least", "largest"
+    found = np.percentile(known, [50, 25, 75, 0, 100]).tolist()
+    return {"count": known.size, **dict(zip(names, found, strict=True))}
 
 
 def paired(first: Array, second: Array) -> Paired:

@@ -2,13 +2,12 @@
 
 import dataclasses
 import math
-import shlex
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
 from hierarchy.notebook import html_table
-from hierarchy.words import some
+from hierarchy.words import gathered, some
 from scenarios.measure.goals import Goal, goals, percent
 from scenarios.measure.metric import shown
 from scenarios.measure.motions import partings
@@ -108,12 +107,8 @@ def _ends(found: Sequence[Verdict]) -> str:
 
 def _promises(found: Sequence[Verdict]) -> str:
     """Return which promises broke, under whom, and by how much at worst."""
-    by: dict[tuple[str, str], list[tuple[str, Goal]]] = {}
-    for one in found:
-        for goal in one.goals:
-            if goal.promise and not goal.met:
-                by.setdefault((f"{goal.name} {goal.asked}".strip(), goal.unit), []).append(
-                    (one.label, goal))
+    by = gathered(((f"{goal.name} {goal.asked}".strip(), goal.unit), (one.label, goal))
+                  for one in found for goal in one.goals if goal.promise and not goal.met)
     if not by:
         promised = any(goal.promise for one in found for goal in one.goals)
         return "Every promise was kept." if promised else ""
@@ -193,11 +188,6 @@ class Comparison:
     def faults(self) -> list[Run]:
         """The runs that did not reach their end."""
         return [run for run in self.runs if run.fault]
-
-    def asked(self, *options: str) -> str:
-        """Return the command that compares the same, with further options."""
-        specs = ",".join(dict.fromkeys(run.spec for run in self.runs))
-        return shlex.join(["hierarchy", "compare", *self._names, "--resolvers", specs, *options])
 
     def groups(self) -> dict[str, list[Run]]:
         """Return the runs that stand side by side, with the name of each group.

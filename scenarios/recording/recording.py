@@ -15,6 +15,7 @@ from hierarchy import plugins
 from hierarchy.errors import HierarchyError, UnknownNameError, check_name, is_one_of
 from hierarchy.notebook import html_table
 from hierarchy.problem import Array
+from hierarchy.words import gathered
 from scenarios.config import Scenario
 from scenarios.recording.facts import Facts
 from scenarios.recording.signals import known
@@ -236,10 +237,7 @@ class Recording:
 
     def troubles(self) -> dict[tuple[str, str], list[int]]:
         """Ticks of each kind of trouble and action, ordered by first occurrence."""
-        found: dict[tuple[str, str], list[int]] = {}
-        for tick, kind, action in self.events:
-            found.setdefault((kind, action), []).append(tick)
-        return found
+        return gathered(((kind, action), tick) for tick, kind, action in self.events)
 
 
 def was_interrupted(fault: str | None) -> bool:

@@ -10,12 +10,12 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from hierarchy.words import listed
+from hierarchy.words import gathered, listed
 from scenarios.measure import statistics
 from scenarios.measure.metric import NOTHING, finite
 from scenarios.measure.metrics import Metric
 from scenarios.measure.runs import Cell, Row, by_name, grouped
-from scenarios.measure.statistics import Paired, Spread, paired, wilson
+from scenarios.measure.statistics import Paired, paired, wilson
 from scenarios.results.plan import Job, Outcome, Plan
 
 # What is weighed in the verdict.
@@ -30,6 +30,7 @@ _BROKEN: dict[str, dict[str, tuple[Callable[..., NDArray[np.bool_]], float]]] = 
     "Every tick solved": {"ticks_not_solved": (np.greater, 0.0)},
     "Kept the distance asked for": {"body_below_share": (np.greater, 0.0),
                                     "ee_below_share": (np.greater, 0.0)}}
+_NUMBER = re.compile(r"\d+(\.\d+)?(e[+-]?\d+)?")
 
 
 class Share(NamedTuple):
@@ -100,10 +101,6 @@ class Results:
         for i in np.flatnonzero(self._of[label]):
             found[self.runs[i].sample] = values[i]
         return found
-
-    def spread(self, name: str, label: str) -> Spread | None:
-        """Return the spread of a metric under a resolver; None if it has no value."""
-        return statistics.spread(self.column(name, label))
 
     def paired(self, name: str, label: str) -> Paired:
         """Return the paired differences of a metric from the first column."""
@@ -176,11 +173,8 @@ class Results:
 
     def failures(self) -> list[Failure]:
         """Return why runs failed; reasons that differ only in numbers are merged by resolver."""
-        found: dict[tuple[str, str], list[tuple[str, Job]]] = {}
-        for run, reason in zip(self.runs, self.reasons, strict=True):
-            if reason is not None:
-                kind = run.label, re.sub(r"\d+(\.\d+)?(e[+-]?\d+)?", "#", reason)
-                found.setdefault(kind, []).append((reason, run))
+        found = gathered(((run.label, _NUMBER.sub("#", reason)), (reason, run)) for run, reason in
+                         zip(self.runs, self.reasons, strict=True) if reason is not None)
         return sorted((Failure(*of[0], len(of)) for of in found.values()),
                       key=lambda one: -one.count)
 
@@ -219,11 +213,10 @@ def rows(results: Results) -> list[Row]:
 
 def _summary(results: Results, metric: Metric, label: str) -> str:
     """Return "median [lower quartile, upper quartile]" of a metric under a resolver."""
-    found = results.spread(metric.name, label)
-    if found is None:
+    found = statistics.spread(results.column(metric.name, label))
+    if not found:
         return "–"
-    median, low, high = (valued(metric, value).shown()
-                         for value in (found.median, found.lower, found.upper))
+    median, low, high = (valued(metric, found[key]).shown() for key in ("median", "lower", "upper"))
     return median if low == high else f"{median} [{low}, {high}]"
 
 
@@ -233,11 +226,8 @@ def results(plan: Plan, kept: Mapping[str, Outcome]) -> dict[str, Results]:
     A group is a scenario; with one resolver and several scenarios there is one group, named after
     the resolver, whose columns are the scenarios.
     """
-    groups: dict[str, list[Job]] = {}
-    for run in plan.runs:
-        groups.setdefault(run.group, []).append(run)
     found = {}
-    for name, runs in groups.items():
+    for name, runs in gathered((run.group, run) for run in plan.runs).items():
         each = [{one.name: one for one in kept[run.key].metrics if one.value is not None}
                 for run in runs]
         metrics = by_name(each)

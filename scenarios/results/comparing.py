@@ -1,12 +1,12 @@
 """Run scenarios under several resolvers, write the runs and report the comparison."""
 
 import dataclasses
+import shlex
 import time
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import suppress
 from functools import partial
 from pathlib import Path
-from typing import final
 
 from hierarchy import plugins
 from hierarchy.errors import HierarchyError, brief, expect, file_path, whole
@@ -56,18 +56,25 @@ def compare(scenarios: Iterable[str | Scenario] | str | Scenario,
     whole("compare: workers", workers, 1)
     planned, refused = _plan(scenarios, resolvers)
     folder = None if out is None else files.make_folder(files.claim(file_path("compare: out", out)))
-    where = [] if out is None else ["--out", str(out)]
-    said = command or Comparison(tuple(planned), "", {}).asked(*where)
+    names = dict.fromkeys(run.scenario.name for run in planned)
+    specs = ",".join(dict.fromkeys(run.spec for run in planned))
+    said = command or shlex.join(["hierarchy", "compare", *names, "--resolvers", specs,
+                                  *([] if out is None else ["--out", str(out)])])
     empty = Comparison((), said, versions(), refused, None if out is None else str(out))
-    written, told = _Written(folder, empty, len(planned)), progress or (lambda *_: None)
-    make = _together if min(workers, len(planned)) > 1 else _one_by_one
+    made, count, due = dict[int, Run](), len(planned), 0.0
+
+    def found() -> Comparison:
+        return dataclasses.replace(empty, runs=tuple(made[i] for i in sorted(made)))
+
+    make = _together if min(workers, count) > 1 else _one_by_one
     try:
-        for i, run in make(planned, folder, workers, told):
-            written.add(i, run)
-        return written.finish()
+        for i, run in make(planned, folder, workers, progress or (lambda *_: None)):
+            made[i] = run
+            due = _so_far(folder, found(), count, due)
+        return _written(folder, found(), count)
     except KeyboardInterrupt:
         with suppress(PageError):  # matplotlib cannot be used if its import was interrupted
-            written.finish()
+            _written(folder, found(), count)
         raise
     finally:
         if folder is not None:
@@ -79,66 +86,54 @@ class PageError(RuntimeError):
     """The page could not be made; the runs are kept."""
 
 
-@final
-class _Written:
-    """The runs made so far, also at Ctrl-C; page and table are written again as they come."""
+def _so_far(folder: Path | None, found: Comparison, count: int, due: float) -> float:
+    """Write the table, and of two runs or more the page if it is due; return when it is again."""
+    if folder is None or not _began(found):
+        return due
+    with suppress(FullError):  # `_written` says so
+        _write_table(folder, found)
+    if 1 < len(found.runs) < count and time.monotonic() >= due:
+        begun = time.monotonic()
+        with suppress(Exception):  # `_written` says what is wrong with it
+            _write_page(folder, found, count)
+        due = begun + (time.monotonic() - begun) / _SHARE
+    return due
 
-    def __init__(self, folder: Path | None, empty: Comparison, count: int) -> None:
-        self._folder, self._empty, self._count = folder, empty, count
-        self._runs: dict[int, Run] = {}
-        self._next = 0.0
 
-    def add(self, i: int, run: Run) -> None:
-        """Take a run; write the table, and the page of two or more unless it was just written."""
-        self._runs[i] = run
-        if self._folder is None or not self._made:
-            return
-        with suppress(FullError):  # `finish` says so
-            self._write_table(self._folder)
-        if 1 < len(self._runs) < self._count and time.monotonic() >= self._next:
-            begun = time.monotonic()
-            with suppress(Exception):  # `finish` says what is wrong with it
-                self._write_page(self._folder)
-            self._next = begun + (time.monotonic() - begun) / _SHARE
+def _written(folder: Path | None, found: Comparison, count: int) -> Comparison:
+    """Write all that is there, also at Ctrl-C, and return it.
 
-    def finish(self) -> Comparison:
-        """Write all that is there and return it.
+    Raises PageError, and KeyboardInterrupt if that came before the first tick.
+    """
+    if not _began(found):
+        raise KeyboardInterrupt
+    try:
+        if folder is not None:
+            _write_table(folder, found)
+            _write_page(folder, found, count)
+    except Exception as error:  # of the disk, a style of matplotlib, a user's figure
+        apart = "".join(f"; {run.label}: {run.error}" for run in found.runs if run.error)
+        raise PageError(f"the page cannot be made: {type(error).__name__}: {error}; the runs are "
+                        f"in {found.folder}{apart}") from error
+    return found
 
-        Raises PageError, and KeyboardInterrupt if that came before the first tick.
-        """
-        if not self._made:
-            raise KeyboardInterrupt
-        found = self._found
-        try:
-            if self._folder is not None:
-                self._write_table(self._folder)
-                self._write_page(self._folder)
-        except Exception as error:  # of the disk, a style of matplotlib, a user's figure
-            apart = "".join(f"; {run.label}: {run.error}" for run in found.runs if run.error)
-            raise PageError(f"the page cannot be made: {type(error).__name__}: {error}; the "
-                            f"runs are in {found.folder}{apart}") from error
-        return found
 
-    @property
-    def _made(self) -> bool:
-        """Whether a run has ticks, or failed."""
-        return any(run.recording or not run.interrupted for run in self._runs.values())
+def _began(found: Comparison) -> bool:
+    """Whether a run has ticks, or failed."""
+    return any(run.recording or not run.interrupted for run in found.runs)
 
-    @property
-    def _found(self) -> Comparison:
-        return dataclasses.replace(self._empty, runs=tuple(
-            self._runs[i] for i in sorted(self._runs)))
 
-    def _write_table(self, folder: Path) -> None:
-        write_table(folder / TABLE, [(job, Outcome(
-            job.key, run.recording.ticks if run.recording else 0, run.fault, None,
-            tuple(run.metrics.values()))) for run in self._found.runs for job in [_job(run)]])
+def _write_table(folder: Path, found: Comparison) -> None:
+    write_table(folder / TABLE, [(job, Outcome(
+        job.key, run.recording.ticks if run.recording else 0, run.fault, None,
+        tuple(run.metrics.values()))) for run in found.runs for job in [_job(run)]])
 
-    def _write_page(self, folder: Path) -> None:
-        from scenarios.results.page import comparison_page
 
-        files.write_json(folder / "comparison.json", self._found.as_plain_data())
-        files.write_text(folder / "index.html", comparison_page(self._found, self._count))
+def _write_page(folder: Path, found: Comparison, count: int) -> None:
+    from scenarios.results.page import comparison_page
+
+    files.write_json(folder / "comparison.json", found.as_plain_data())
+    files.write_text(folder / "index.html", comparison_page(found, count))
 
 
 def _job(run: Run) -> Job:

@@ -14,6 +14,7 @@ from scenarios.config import Scenario, load
 from scenarios.config.validation import validated
 from scenarios.files import finite, write_text
 from scenarios.measure.run_folder import versions
+from scenarios.measure.statistics import spread
 from scenarios.results import cluster, pool
 from scenarios.results.columns import Results, results, verdict
 from scenarios.results.plan import Job, Outcome, Plan, Sweep, find, load_sweep, outcome, plan
@@ -173,9 +174,10 @@ def _column(results: Results, label: str) -> dict[str, Any]:
                                   "wilson_95": list(by[label].interval)}
                            for what, by in results.shares().items()}
     for metric in results.shown():
-        spread, beside = results.spread(metric.name, label), results.paired(metric.name, label)
+        beside = results.paired(metric.name, label)
         metrics[metric.name] = {
-            "label": metric.label, "unit": metric.unit, **(asdict(spread) if spread else {}),
+            "label": metric.label, "unit": metric.unit,
+            **spread(results.column(metric.name, label)),
             **({} if label == results.labels[0] else
                {"against_first": {**asdict(beside), "said": str(beside)}}),
             "best": label in results.best(metric)}

@@ -134,8 +134,8 @@ def studies():
         found.append([warm["verdict"], warm["relative"]])
     h = Hierarchy.from_levels([(np.eye(1), [-1.0], [1.0]), (np.eye(1), [1.0])])
     unanswered = judge.judged({"entrant": "one", "family": "f", "raised": "no"}, h, None)
-    fallen = SimpleNamespace(runs=[SimpleNamespace(label="one")], reasons=["fell"],
-                             values=["torque_step_max"], column=lambda *_: np.array([np.nan]))
+    fallen = SimpleNamespace(values=["torque_step_max"], compared=lambda *_: np.array([np.nan]),
+                             shares=lambda: {"Reached the end": {"one": "0 of 1"}})
     events = [[0.0, True, "solvers.kernels.a.b"], [2.0, False, "solvers.kernels.a.b"]]
     cases = [Case("help", 0.5, ["a"]), Case("first", None, [start._COMPILE]),
              Case("library", 10.0, ["b"])]

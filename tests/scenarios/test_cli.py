@@ -75,8 +75,8 @@ terminal.bar = lambda *_: contextlib.nullcontext(
     assert [path.name for path in tmp_path.iterdir()] == ["a"]
 
 
-def add_and_interrupt(written, i, run, add=comparing._Written.add):
-    add(written, i, run)
+def write_and_interrupt(*given, write=comparing._so_far):
+    write(*given)
     raise KeyboardInterrupt
 
 
@@ -86,9 +86,9 @@ def add_and_interrupt(written, i, run, add=comparing._Written.add):
      "the runs made so far are in b", 2, ()),
     ({"comparing.write_table": mock.Mock(side_effect=FullError("full"))}, 1, 1,
      "FullError: full; the runs are in b", 2, ()),
-    ({"comparing._Written.add": add_and_interrupt}, 2, 130, "the runs made so far are in b", 1,
+    ({"comparing._so_far": write_and_interrupt}, 2, 130, "the runs made so far are in b", 1,
      ("results.csv", "index.html", "comparison.json")),
-    ({"comparing._Written.add": add_and_interrupt,
+    ({"comparing._so_far": write_and_interrupt,
       "page.comparison_page": mock.Mock(side_effect=ArithmeticError)}, 1, 130,
      "the runs made so far are in b", 1, ("results.csv",))],
     ids=["before the first tick", "while runs are timed", "no room for the table",
