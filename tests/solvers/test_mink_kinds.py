@@ -73,7 +73,7 @@ def test_one_level_is_the_minimum_of_minks_cost(configuration, kinds, held, damp
     values = np.linalg.svd(A, compute_uv=False)
     least = values[values > 1e-9].min()
     rounding = 2e-16 * (values[0] / least) ** 2  # what doubles can tell of this minimum
-    np.testing.assert_allclose(ours, x, atol=1e-7 + 10.0 * rounding)
+    np.testing.assert_allclose(ours, x, atol=1e-7 + 50.0 * rounding)
 
 
 def test_kinetic_energy_below_a_hand_is_the_least_motion_that_moves_it(configuration):
