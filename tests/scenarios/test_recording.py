@@ -99,7 +99,7 @@ def test_what_is_written_is_there_as_a_whole_or_not_at_all(tmp_path):
 
 def test_a_folder_that_another_process_has_locked_cannot_be_claimed(tmp_path):
     code = ("import sys; from pathlib import Path; from scenarios.files import lock\n"
-            "lock(Path(sys.argv[1])); print(); sys.stdin.read()")
+            "lock(Path(sys.argv[1])); print(flush=True); sys.stdin.read()")
     with subprocess.Popen([sys.executable, "-c", code, str(tmp_path / "run")],
                           stdin=subprocess.PIPE, stdout=subprocess.PIPE) as other:
         other.stdout.readline()
