@@ -56,11 +56,8 @@ def compare(scenarios: Iterable[str | Scenario] | str | Scenario,
     whole("compare: workers", workers, 1)
     planned, refused = _plan(scenarios, resolvers)
     folder = None if out is None else files.make_folder(files.claim(file_path("compare: out", out)))
-    names = dict.fromkeys(run.scenario.name for run in planned)
-    specs = ",".join(dict.fromkeys(run.spec for run in planned))
-    said = command or shlex.join(["hierarchy", "compare", *names, "--resolvers", specs,
-                                  *([] if out is None else ["--out", str(out)])])
-    empty = Comparison((), said, versions(), refused, None if out is None else str(out))
+    where = None if out is None else str(out)
+    empty = Comparison((), command or _command(planned, where), versions(), refused, where)
     made, count, due = dict[int, Run](), len(planned), 0.0
 
     def found() -> Comparison:
@@ -80,6 +77,14 @@ def compare(scenarios: Iterable[str | Scenario] | str | Scenario,
         if folder is not None:
             files.remove_empty(folder)
             files.unlock(folder)
+
+
+def _command(planned: Sequence[Run], out: str | None) -> str:
+    """Return the command that makes a comparison."""
+    names = dict.fromkeys(run.scenario.name for run in planned)
+    specs = ",".join(dict.fromkeys(run.spec for run in planned))
+    where = [] if out is None else ["--out", out]
+    return shlex.join(["hierarchy", "compare", *names, "--resolvers", specs, *where])
 
 
 class PageError(RuntimeError):
